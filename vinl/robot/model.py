@@ -1,0 +1,60 @@
+"""The AlienGo as a MuJoCo spec: one MJCF, two collision sets, two solver settings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import mujoco
+
+from vinl.config.paths import assets_dir
+from vinl.robot.aliengo import KD, KP, PHYSICS_DT
+
+CollisionSet = Literal["spheres", "primitives"]
+_GROUP = {"spheres": 3, "primitives": 4}
+_VISUAL_GROUP = 2
+
+
+def mjcf_path() -> Path:
+    """The robot's MJCF file."""
+    return assets_dir() / "aliengo" / "aliengo.xml"
+
+
+def robot_spec(collision: CollisionSet, visual: bool = False, kp: float = KP, kd: float = KD) -> mujoco.MjSpec:
+    """The robot in an empty world; the caller adds the ground and compiles.
+
+    Args:
+        collision: ``"spheres"`` for MJX on height fields, ``"primitives"`` for MuJoCo C. The feet are in both.
+        visual: keep the visual meshes, which physics does not need.
+        kp: position gain of every joint [N m / rad].
+        kd: velocity gain of every joint [N m s / rad].
+
+    Returns:
+        A spec with the solver settings of the collision set: one Newton iteration with Euler for the spheres (fast,
+        stable only with eulerdamp off), converged elliptic contacts for the primitives.
+    """
+    spec = mujoco.MjSpec.from_file(str(mjcf_path()))
+    unwanted = {group for name, group in _GROUP.items() if name != collision}
+    if not visual:
+        unwanted.add(_VISUAL_GROUP)
+    for geom in list(spec.geoms):
+        if geom.group in unwanted:
+            spec.delete(geom)
+    if not visual:
+        for mesh in list(spec.meshes):
+            spec.delete(mesh)
+    for actuator in spec.actuators:
+        actuator.gainprm[0] = kp
+        actuator.biasprm[1:3] = (-kp, -kd)
+    option = spec.option
+    option.timestep = PHYSICS_DT
+    if collision == "spheres":
+        option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+        option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+        option.iterations, option.ls_iterations = 1, 5
+    else:
+        option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        option.impratio = 10
+        option.iterations, option.ls_iterations = 50, 50
+    return spec

@@ -1,0 +1,38 @@
+"""Rotations by unit quaternions w, x, y, z, for numpy and jax.numpy alike: ``xp`` is the array module."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def rotate_inverse(xp: Any, quaternion: Any, vector: Any) -> Any:
+    """Turn world vectors into the body frame.
+
+    Args:
+        xp: ``numpy`` or ``jax.numpy``.
+        quaternion: (..., 4), body to world, unit length.
+        vector: (..., 3).
+
+    Returns:
+        (..., 3), the vectors in the body frame.
+    """
+    w, r = quaternion[..., :1], -quaternion[..., 1:]
+    t = 2 * xp.cross(r, vector)
+    return vector + w * t + xp.cross(r, t)
+
+
+def yaw_of(xp: Any, quaternion: Any) -> Any:
+    """Heading [rad] of unit quaternions (..., 4): the angle of the body's x axis seen from above."""
+    w, x, y, z = (quaternion[..., k] for k in range(4))
+    return xp.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2))
+
+
+def matrix_of(xp: Any, quaternion: Any) -> Any:
+    """Rotation matrices (..., 3, 3), body to world, of unit quaternions (..., 4)."""
+    w, x, y, z = (quaternion[..., k] for k in range(4))
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return xp.stack([xp.stack(row, -1) for row in rows], -2)

@@ -1,0 +1,66 @@
+"""Upright boxes: the one shape that walls, furniture and blocks are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from vinl.config.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """Boxes that stand upright, turned about the vertical axis only.
+
+    Attributes:
+        rows: shape (n, 7), one box a row: x, y of the centre [m], yaw [rad], length along the box's own x axis [m],
+            width along its own y axis [m], bottom z [m], top z [m].
+
+    Raises:
+        InputError: if the shape is wrong, a number is not finite, or a size is not positive.
+    """
+
+    rows: Float[np.ndarray, "n 7"]
+    COLUMNS: ClassVar[tuple[str, ...]] = ("x", "y", "yaw", "length", "width", "bottom", "top")
+
+    def __post_init__(self) -> None:
+        rows = np.asarray(self.rows, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != 7:
+            raise InputError(f"boxes need shape (n, 7), got {rows.shape}")
+        if not np.isfinite(rows).all():
+            raise InputError("boxes hold a number that is not finite")
+        if (rows[:, 3:5] <= 0).any() or (rows[:, 6] <= rows[:, 5]).any():
+            raise InputError("boxes need positive length, width and height")
+        object.__setattr__(self, "rows", rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @classmethod
+    def empty(cls) -> Boxes:
+        """No boxes at all."""
+        return cls(np.zeros((0, 7)))
+
+    def __add__(self, other: Boxes) -> Boxes:
+        return Boxes(np.concatenate([self.rows, other.rows]))
+
+    def __getitem__(self, index) -> Boxes:
+        return Boxes(np.atleast_2d(self.rows[index]))
+
+    def corners(self) -> Float[np.ndarray, "n 4 2"]:
+        """Corners of the footprints [m], counter-clockwise."""
+        x, y, yaw, length, width = self.rows[:, :5].T
+        sx, sy = np.array([1, -1, -1, 1]), np.array([1, 1, -1, -1])
+        u, v = sx * length[:, None] / 2, sy * width[:, None] / 2
+        c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
+        return np.stack([x[:, None] + c * u - s * v, y[:, None] + s * u + c * v], -1)
+
+    def contain(self, points: Float[np.ndarray, "k 2"]) -> Bool[np.ndarray, "n k"]:
+        """Which box's footprint holds which point (edges included)."""
+        d = np.asarray(points)[None] - self.rows[:, None, :2]
+        c, s = np.cos(self.rows[:, 2, None]), np.sin(self.rows[:, 2, None])
+        u, v = c * d[..., 0] + s * d[..., 1], -s * d[..., 0] + c * d[..., 1]
+        return (np.abs(u) <= self.rows[:, 3, None] / 2 + 1e-9) & (np.abs(v) <= self.rows[:, 4, None] / 2 + 1e-9)
