@@ -1,0 +1,98 @@
+"""The command line: picks the command, turns bad input into one line. Imports nothing heavy by itself."""
+
+from __future__ import annotations
+
+import errno
+import importlib
+import os
+import sys
+
+from vinl.config.errors import InputError
+
+COMMANDS = {
+    "eval": ("vinl.cli.eval", "the whole chain in MuJoCo: a robot crosses floor plans; report, figures, video"),
+    "eval-loco": ("vinl.cli.eval_loco", "the locomotor alone in MuJoCo, under random commands"),
+    "train-loco": ("vinl.cli.train_loco", "train a locomotor (needs the train extra)"),
+    "plans": ("vinl.cli.plans", "list the shipped floor plans, draw a floor plan"),
+    "policies": ("vinl.cli.policies", "the trained policies that come with vinl, and their measured figures"),
+    "bench": ("vinl.cli.bench", "how fast training physics and the depth camera run here"),
+    "doctor": ("vinl.cli.doctor", "versions, devices, and a one-second check of each part"),
+}
+"""Command to its module, whose ``main(argv)`` runs it, and its line in the help."""
+
+TRAIN_MODULES = {"jax", "jaxlib", "rsl_rl", "gymnasium", "tensorboard", "tensordict"}
+"""Top-level modules that only the train extra installs; ``mujoco.mjx`` is the one more, inside ``mujoco``."""
+
+TRAIN_HINT = 'pip install "vinl[train]"'
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run a command and return its exit code: 0 well, 1 a check failed, 2 bad input, 130 interrupted."""
+    argv = sys.argv[1:] if argv is None else argv
+    if not argv or argv[0] in ("-h", "--help", "help"):
+        print(_help())
+        return 0
+    if argv[0] in ("-V", "--version"):
+        from importlib.metadata import version
+
+        print(f"vinl {version('vinl')}")
+        return 0
+    try:
+        return _run(argv[0], argv[1:])
+    except InputError as error:
+        return _fail(str(error))
+    except ModuleNotFoundError as error:
+        name = error.name or ""
+        if name.split(".")[0] in TRAIN_MODULES or name.startswith("mujoco.mjx"):
+            return _fail(f"vinl {argv[0]} needs {name}, which only training uses; install it: {TRAIN_HINT}")
+        raise
+    except BrokenPipeError:  # the reader (head, less) has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        if error.filename is None or error.errno not in _USERS_ERRNO:
+            raise
+        return _fail(f"{error.filename}: {error.strerror}; choose another path or make room")
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+
+
+_USERS_ERRNO = {errno.EACCES, errno.EPERM, errno.ENOSPC, errno.EROFS, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG}
+"""What goes wrong with a path that the user chose; anything else is a fault of ours and keeps its traceback."""
+
+
+def _run(command: str, argv: list[str]) -> int:
+    if command not in COMMANDS:
+        import difflib
+
+        near = difflib.get_close_matches(command, COMMANDS, n=1, cutoff=0.4)
+        meant = f", did you mean {near[0]!r}?" if near else ""
+        raise InputError(f"unknown command {command!r}{meant} (vinl --help lists all)")
+    module = importlib.import_module(COMMANDS[command][0])
+    return module.main(argv) or 0
+
+
+def _fail(message: str) -> int:
+    print(f"error: {' '.join(message.splitlines())}", file=sys.stderr)
+    return 2
+
+
+def _help() -> str:
+    rows = "\n".join(f"  {name:<12}{summary}" for name, (_, summary) in COMMANDS.items())
+    return f"""usage: vinl COMMAND [OPTIONS]
+
+A legged robot crosses homes it has never seen and steps over their clutter, seeing only through depth cameras.
+
+commands:
+{rows}
+
+options:
+  -h, --help    this text; vinl COMMAND --help explains a command
+  --version     the version
+
+try: vinl eval --floorplans harbour_flat --loco rough --nav oracle --episodes 2 --out runs/first --video"""
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,107 @@
+"""The networks of the shipped policies, and the registry that rebuilds one from its policy card."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from vinl.config.errors import InputError
+from vinl.config.fields import closest
+from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE
+
+NETWORKS: dict[str, type[PolicyNetwork]] = {}
+"""Class name to class: what a policy card may name."""
+
+
+class PolicyNetwork(nn.Module):
+    """A network that a policy card can describe and rebuild. Subclasses register themselves by their class name.
+
+    Attributes:
+        observation_size: numbers in.
+        action_size: numbers out.
+        arguments: plain arguments of the constructor.
+    """
+
+    observation_size: int
+    action_size: int
+    arguments: dict[str, Any]
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        NETWORKS[cls.__name__] = cls
+
+    def describe(self) -> dict[str, Any]:
+        """What ``build_network`` needs: the class name and the constructor's arguments, as plain data."""
+        return {"class": type(self).__name__, **self.arguments}
+
+
+class MapActor(PolicyNetwork):
+    """The deterministic locomotion actor: the height scan becomes a short code, proprioception + code an action.
+
+    Parameters are named ``encoder.*`` and ``actor.*``. Sizes and activations are the paper's [paper III-A, facts:
+    locomotion 5.1]: ReLU inside the encoder and none at its end, ELU inside the actor.
+    """
+
+    def __init__(
+        self,
+        proprioception: int = PROPRIOCEPTION_SIZE,
+        scan: int = SCAN_SIZE,
+        encoder: Sequence[int] = (128, 64),
+        code: int = 32,
+        actor: Sequence[int] = (512, 256, 128),
+        actions: int = 12,
+    ) -> None:
+        """Sizes of the parts; ``encoder`` and ``actor`` are the widths of the hidden layers."""
+        super().__init__()
+        self.arguments = {
+            "proprioception": proprioception,
+            "scan": scan,
+            "encoder": list(encoder),
+            "code": code,
+            "actor": list(actor),
+            "actions": actions,
+        }
+        self.proprioception = proprioception
+        self.observation_size, self.action_size = proprioception + scan, actions
+        self.encoder = mlp([scan, *encoder, code], nn.ReLU)
+        self.actor = mlp([proprioception + code, *actor, actions], nn.ELU)
+
+    def forward(self, observation: Float[Tensor, "n observation"]) -> Float[Tensor, "n actions"]:
+        """Scaled observations in the order of ``robot.observation.TABLE`` to actions."""
+        code = self.encoder(observation[..., self.proprioception :])
+        return self.actor(torch.cat([observation[..., : self.proprioception], code], -1))
+
+
+def mlp(sizes: Sequence[int], activation: Callable[[], nn.Module]) -> nn.Sequential:
+    """Linear layers through ``sizes`` with ``activation`` between them and none at the end."""
+    layers: list[nn.Module] = []
+    for k, (size_in, size_out) in enumerate(pairwise(sizes)):
+        layers += [activation()] if k else []
+        layers.append(nn.Linear(size_in, size_out))
+    return nn.Sequential(*layers)
+
+
+def build_network(description: dict[str, Any], source: str = "policy card") -> PolicyNetwork:
+    """The network that ``PolicyNetwork.describe`` described, with fresh weights.
+
+    Raises:
+        InputError: unknown class, or arguments that it does not take; ``source`` names the card in the message.
+    """
+    arguments = dict(description)
+    name = arguments.pop("class", None)
+    if name not in NETWORKS:
+        known = ", ".join(sorted(NETWORKS))
+        raise InputError(f"{source}: unknown network class {name!r}{closest(str(name), NETWORKS)}; known: {known}")
+    for key, value in arguments.items():
+        for size in value if isinstance(value, list) else [value]:
+            if isinstance(size, bool) or not isinstance(size, int) or size < 1:
+                raise InputError(f"{source}: network size {key} must be a positive whole number, got {size!r}")
+    try:
+        return NETWORKS[name](**arguments)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise InputError(f"{source}: network {name} cannot be built from {arguments}: {error}") from None

@@ -1,0 +1,64 @@
+"""A policy object: what the chain calls, whatever network is inside."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from vinl.policies.card import PolicyCard
+from vinl.policies.networks import PolicyNetwork
+
+A = TypeVar("A", np.ndarray, Tensor)
+
+
+class Policy(Protocol):
+    """Batched: one call acts for all robots. Recurrent state, if any, lives inside."""
+
+    card: PolicyCard
+
+    def reset(self, which: int | Bool[np.ndarray, " n"] | Bool[Tensor, " n"]) -> None:
+        """Forget the past of all of n robots, or of those that a mask marks."""
+        ...
+
+    def act(self, observation: Any) -> Any:
+        """Actions for the observations of all robots; numpy in, numpy out; torch in, torch out."""
+        ...
+
+
+class LocomotionPolicy:
+    """Observations (n, 235) to actions (n, 12) at 50 Hz, without noise, on the device of its network."""
+
+    def __init__(self, network: PolicyNetwork, card: PolicyCard) -> None:
+        """Takes the network over: it is put into evaluation mode and its gradients are switched off."""
+        self.card = card
+        self.network = network.eval().requires_grad_(False)
+        self.device = next(network.parameters()).device
+
+    def reset(self, which: int | Bool[np.ndarray, " n"] | Bool[Tensor, " n"]) -> None:
+        """This policy has no memory: nothing to forget."""
+
+    def act(self, observation: Float[A, "n observation"]) -> Float[A, "n actions"]:
+        """Actions for scaled observations.
+
+        Args:
+            observation: (n, 235) in the order of the card's observation table, numpy or torch, any float type.
+
+        Returns:
+            (n, 12) of the same kind and on the same device; numpy as float32.
+
+        Raises:
+            ValueError: another number of columns than the network takes.
+        """
+        if observation.ndim != 2 or observation.shape[1] != self.network.observation_size:
+            wanted = f"(n, {self.network.observation_size})"
+            raise ValueError(f"{self.card.name} observes {wanted}, got {tuple(observation.shape)}")
+        with torch.inference_mode():
+            if isinstance(observation, Tensor):
+                action = self.network(observation.to(self.device, torch.float32))
+                return action.to(observation.device, observation.dtype).clone()
+            tensor = torch.from_numpy(np.ascontiguousarray(observation, dtype=np.float32)).to(self.device)
+            return self.network(tensor).cpu().numpy()
