@@ -1,0 +1,43 @@
+"""The height scan: what the ground's height is under 187 points around the robot, for numpy and jax.numpy alike."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from vinl.robot.observation import SCAN_POINTS
+from vinl.robot.rotation import yaw_of
+from vinl.world.grid import GridFrame
+
+
+def scan_ground(xp: Any, heights: Any, frame: GridFrame, qpos: Any) -> Any:
+    """Height of the ground under every scan point, read from the nearest cell of a grid.
+
+    The points of ``SCAN_POINTS`` are turned by the trunk's heading (not by its roll and pitch) and moved to the trunk.
+    A point outside the grid reads the grid's nearest edge cell. The frame is static, so under ``jax.jit`` the whole
+    scan is one gather from a flat array.
+
+    Args:
+        xp: ``numpy`` or ``jax.numpy``.
+        heights: (rows * columns,) or (rows, columns), height of the ground [m], rows along y.
+        frame: where the cells lie.
+        qpos: (n, >= 7), trunk position [m] and unit quaternion w x y z; what follows is ignored.
+
+    Returns:
+        (n, 187) heights [m], in the order of ``SCAN_POINTS``.
+
+    Raises:
+        ValueError: if the heights do not have as many cells as the frame.
+    """
+    rows, columns = frame.shape
+    flat = heights.reshape(-1)
+    if flat.shape[0] != rows * columns:
+        raise ValueError(f"heights hold {flat.shape[0]} cells, the frame has {rows} x {columns}")
+    points = xp.asarray(SCAN_POINTS / frame.resolution, dtype=qpos.dtype)
+    yaw = yaw_of(xp, qpos[:, 3:7])[:, None]
+    c, s = xp.cos(yaw), xp.sin(yaw)
+    j = (qpos[:, 0:1] - frame.x0) / frame.resolution + c * points[:, 0] - s * points[:, 1]
+    i = (qpos[:, 1:2] - frame.y0) / frame.resolution + s * points[:, 0] + c * points[:, 1]
+    # Held to the grid while still floating point: a robot that was thrown far away must not overflow the integer.
+    row = xp.clip(xp.rint(i), 0, rows - 1).astype(xp.int32)
+    column = xp.clip(xp.rint(j), 0, columns - 1).astype(xp.int32)
+    return xp.take(flat, row * columns + column, mode="clip")
