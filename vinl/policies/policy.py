@@ -56,9 +56,9 @@ class LocomotionPolicy:
         if observation.ndim != 2 or observation.shape[1] != self.network.observation_size:
             wanted = f"(n, {self.network.observation_size})"
             raise ValueError(f"{self.card.name} observes {wanted}, got {tuple(observation.shape)}")
-        with torch.inference_mode():
+        with torch.no_grad():
             if isinstance(observation, Tensor):
                 action = self.network(observation.to(self.device, torch.float32))
-                return action.to(observation.device, observation.dtype).clone()
+                return action.to(observation.device, observation.dtype)
             tensor = torch.from_numpy(np.ascontiguousarray(observation, dtype=np.float32)).to(self.device)
             return self.network(tensor).cpu().numpy()

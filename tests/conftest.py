@@ -1,0 +1,58 @@
+"""Test settings: array shapes are checked, JAX and torch share two cores, every test runs in a folder of its own."""
+
+import hashlib
+import os
+import platform
+from pathlib import Path
+
+import hypothesis
+import pytest
+from jaxtyping import install_import_hook
+
+for _name, _value in {
+    "JAX_PLATFORMS": "cpu",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1",
+    "OMP_NUM_THREADS": "1",
+    "MPLBACKEND": "Agg",
+    "NO_COLOR": "1",
+    "COLUMNS": "120",
+}.items():
+    os.environ.setdefault(_name, _value)
+
+
+def _checked_modules() -> list[str]:
+    """All modules of vinl but those with Warp kernels: Warp compiles a function's source and bears no wrapper."""
+    root = Path(__file__).resolve().parent.parent
+    files = [p for p in sorted((root / "vinl").glob("*/**/*.py")) if p.name != "__init__.py"]
+    return [".".join(p.relative_to(root).with_suffix("").parts) for p in files if "@wp." not in p.read_text()]
+
+
+install_import_hook(_checked_modules(), "beartype.beartype")  # before the first import of vinl in this process
+
+hypothesis.settings.register_profile(
+    "quick", max_examples=25, derandomize=True, deadline=None, database=None, print_blob=False
+)
+hypothesis.settings.load_profile("quick")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep XLA's compiled programs beside pytest's cache: the second run starts in a fraction of the time."""
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.rootpath / ".pytest_cache" / "xla" / _processor()))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.5")
+
+
+def _processor() -> str:
+    """Compiled programs fit one kind of processor; a checkout may move to another."""
+    info = Path("/proc/cpuinfo")
+    flags = (
+        [line for line in info.read_text().splitlines() if line.startswith(("flags", "model name"))][:2]
+        if (info.exists())
+        else []
+    )
+    return hashlib.sha256("\n".join([platform.machine(), *flags]).encode()).hexdigest()[:12]
+
+
+@pytest.fixture(autouse=True)
+def in_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever a test writes to a relative path lands in its temporary folder."""
+    monkeypatch.chdir(tmp_path)
