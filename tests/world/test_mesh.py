@@ -50,7 +50,7 @@ def test_plan_mesh_has_floor_blocks_and_ceiling():
 
 
 def test_empty_plan_is_only_floor():
-    plan = SimpleNamespace(boxes=Boxes.empty(), frame=GridFrame(0, 0, 0.1, (5, 5)))
+    plan = SimpleNamespace(boxes=Boxes.empty(), frame=GridFrame(0.0, 0.0, 0.1, (5, 5)))
     vertices, faces = floorplan_mesh(plan)
     assert (vertices == floor_mesh(plan.frame)[0]).all() and len(faces) == 2
 
@@ -64,4 +64,4 @@ def test_height_field_mesh():
     with pytest.raises(ValueError, match="shape"):
         heightfield_mesh(heights.T, frame)
     with pytest.raises(ValueError, match="2 x 2"):
-        heightfield_mesh(heights[:1], GridFrame(0, 0, 1, (1, 7)))
+        heightfield_mesh(heights[:1], GridFrame(0.0, 0.0, 1.0, (1, 7)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -20,6 +20,7 @@ TRIANGLES_PER_BOX = len(_TRIANGLES)
 """``box_mesh`` gives every box this many faces, box after box."""
 
 
+@runtime_checkable
 class HasWalls(Protocol):
     """What a mesh needs of a floor plan."""
 

@@ -1,0 +1,190 @@
+"""The depth camera: rays against triangle meshes, many worlds and many robots in one launch, on CPU or GPU."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+import warp as wp
+from jaxtyping import Float
+
+from vinl.config.errors import InputError
+from vinl.robot.cameras import Camera
+from vinl.sensing.kernels import render_depth
+
+Mesh = tuple[np.ndarray, np.ndarray]
+"""Vertices (v, 3) [m] and faces (f, 3)."""
+
+
+def build_mesh(vertices: np.ndarray, faces: np.ndarray, device: str) -> wp.Mesh:
+    """A mesh with its ray tree on the device.
+
+    Raises:
+        InputError: if there is no face, a face names a vertex that is not there, or a vertex is not finite.
+    """
+    vertices, faces = np.asarray(vertices, np.float32), np.asarray(faces, np.int32)
+    if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1:] != (3,) or faces.shape[1:] != (3,) or not len(faces):
+        raise InputError(f"a mesh needs (v, 3) vertices and (f, 3) faces, got {vertices.shape} and {faces.shape}")
+    if not np.isfinite(vertices).all() or faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError("a mesh has a vertex that is not finite or a face that names no vertex")
+    points = wp.array(np.ascontiguousarray(vertices), dtype=wp.vec3, device=device)
+    return wp.Mesh(points=points, indices=wp.array(faces.ravel(), dtype=wp.int32, device=device))
+
+
+def check_device(device: str | torch.device) -> torch.device:
+    """The device, with its number.
+
+    Raises:
+        InputError: if it is a GPU that is not there.
+    """
+    chosen = torch.device(device)
+    if chosen.type == "cuda":
+        if not torch.cuda.is_available() or not wp.is_cuda_available():
+            raise InputError("device cuda: no CUDA device is available here; use device cpu")
+        return torch.device("cuda", torch.cuda.current_device() if chosen.index is None else chosen.index)
+    return chosen
+
+
+class DepthCamera:
+    """A depth camera that looks into any of several worlds.
+
+    Depth is metres along the optical axis (planar, not along the ray); nothing hit, or farther than the camera's far
+    limit, reads as the far limit. The robot's own body is not there.
+
+    Args:
+        meshes: vertices (v, 3) [m] and faces (f, 3) of every world, see ``vinl.world.mesh``.
+        camera: mount, field of view, image size and far limit.
+        device: ``"cpu"``, ``"cuda"`` or ``"cuda:0"``.
+        dtype: ``torch.float32`` or ``torch.float16`` depth.
+
+    Raises:
+        InputError: no mesh, a broken mesh, a dtype that is neither of the two, or a GPU that is not there.
+    """
+
+    def __init__(
+        self,
+        meshes: Sequence[Mesh],
+        camera: Camera,
+        device: str | torch.device = "cpu",
+        dtype: torch.dtype = torch.float32,
+    ) -> None:
+        if not meshes:
+            raise InputError("a depth camera needs at least one mesh to look at")
+        if dtype not in (torch.float16, torch.float32):
+            raise InputError(f"depth is float32 or float16, not {dtype}")
+        self.camera = camera
+        self.device = check_device(device)
+        self.dtype = dtype
+        self._warp_device = str(self.device)
+        self._meshes = [build_mesh(vertices, faces, self._warp_device) for vertices, faces in meshes]
+        self._ids = wp.array([mesh.id for mesh in self._meshes], dtype=wp.uint64, device=self._warp_device)
+        self._mount = self._on_device(np.array(camera.position))
+        self._turn = self._on_device(camera.rotation())
+        self._tan_half = self._on_device(np.array([camera.tan_half]))
+
+    def __len__(self) -> int:
+        """How many worlds there are."""
+        return len(self._meshes)
+
+    def render(
+        self, world: Any, position: Any, rotation: Any, out: torch.Tensor | None = None
+    ) -> Float[torch.Tensor, "n height width"]:
+        """What the camera on each robot sees.
+
+        Args:
+            world: (n,) integers, the world that each robot is in. On a GPU tensor the range is not checked.
+            position: (n, 3) of the trunk [m], numpy or torch, any device.
+            rotation: (n, 3, 3) trunk to world.
+            out: (n, height, width) tensor to write into, of the camera's device and dtype; a new one by default.
+
+        Returns:
+            Depth [m]. On a GPU it is written in order with torch's current stream.
+
+        Raises:
+            InputError: a shape does not fit, or a world does not exist.
+        """
+        position, rotation = self._on_device(position), self._on_device(rotation)
+        _check_shapes(world, position, rotation)
+        return self.render_poses(world, position + rotation @ self._mount, rotation @ self._turn, out=out)
+
+    def render_poses(
+        self,
+        world: Any,
+        position: Any,
+        rotation: Any,
+        tan_half: Any | None = None,
+        out: torch.Tensor | None = None,
+    ) -> Float[torch.Tensor, "n height width"]:
+        """What a camera sees from given poses, for mounts that differ from image to image.
+
+        Args:
+            world: (n,) integers, the world that each camera is in. On a GPU tensor the range is not checked.
+            position: (n, 3) of the optical centre in the world [m].
+            rotation: (n, 3, 3) camera to world: columns are forward, left and up.
+            tan_half: (n, 2) tangents of half the horizontal and vertical field of view; the camera's own by default.
+            out: as in ``render``.
+
+        Returns:
+            Depth [m], as in ``render``.
+
+        Raises:
+            InputError: a shape does not fit, or a world does not exist.
+        """
+        position, rotation = self._on_device(position), self._on_device(rotation)
+        _check_shapes(world, position, rotation)
+        n, shape = len(position), (len(position), self.camera.height, self.camera.width)
+        tan_half = self._tan_half.expand(n, 2) if tan_half is None else self._on_device(tan_half)
+        if tuple(tan_half.shape) != (n, 2):
+            raise InputError(f"tan_half needs shape ({n}, 2), got {tuple(tan_half.shape)}")
+        if out is None:
+            out = torch.empty(shape, dtype=self.dtype, device=self.device)
+        elif out.shape != shape or out.dtype != self.dtype or out.device != self.device or not out.is_contiguous():
+            raise InputError(f"out needs shape {shape}, {self.dtype}, {self.device}, contiguous")
+        if n == 0:
+            return out
+        wp.launch(
+            render_depth,
+            dim=shape,
+            inputs=[
+                self._ids,
+                wp.from_torch(self._world(world), dtype=wp.int32),
+                wp.from_torch(position.contiguous(), dtype=wp.vec3),
+                wp.from_torch(rotation.contiguous(), dtype=wp.mat33),
+                wp.from_torch(tan_half.contiguous(), dtype=wp.vec2),
+                self.camera.far,
+            ],
+            outputs=[wp.from_torch(out)],
+            device=self._warp_device,
+            stream=self._stream(),
+        )
+        return out
+
+    def _stream(self) -> wp.Stream | None:
+        if self.device.type == "cpu":
+            return None
+        return wp.stream_from_torch(torch.cuda.current_stream(self.device))
+
+    def _on_device(self, values: Any) -> torch.Tensor:
+        return torch.as_tensor(values, dtype=torch.float32, device=self.device).detach()
+
+    def _world(self, world: Any) -> torch.Tensor:
+        # A look at numbers on the GPU would make the host wait for it, so only what lies here is checked.
+        on_gpu = isinstance(world, torch.Tensor) and world.device.type != "cpu"
+        if not on_gpu:
+            numbers = np.asarray(world)
+            if len(numbers) and (numbers.min() < 0 or numbers.max() >= len(self)):
+                raise InputError(
+                    f"world {numbers.min()}..{numbers.max()} is out of range, there are {len(self)} worlds"
+                )
+        return torch.as_tensor(world, device=self.device).to(torch.int32).contiguous()
+
+
+def _check_shapes(world: Any, position: torch.Tensor, rotation: torch.Tensor) -> None:
+    n = len(world)
+    if tuple(position.shape) != (n, 3) or tuple(rotation.shape) != (n, 3, 3):
+        raise InputError(
+            f"{n} worlds need positions ({n}, 3) and rotations ({n}, 3, 3), "
+            f"got {tuple(position.shape)} and {tuple(rotation.shape)}"
+        )

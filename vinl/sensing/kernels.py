@@ -1,0 +1,55 @@
+"""The Warp kernels of the depth camera. A file of their own: Warp compiles these functions, Python never runs them."""
+
+# pyright: reportInvalidTypeForm=false, reportCallIssue=false, reportArgumentType=false
+# pyright: reportOperatorIssue=false, reportIndexIssue=false, reportAttributeAccessIssue=false
+
+from typing import Any, no_type_check
+
+import warp as wp
+
+from vinl.sensing.warp_start import start_warp
+
+start_warp()
+
+
+@wp.kernel
+@no_type_check
+def render_depth(
+    meshes: wp.array(dtype=wp.uint64),
+    world: wp.array(dtype=wp.int32),
+    position: wp.array(dtype=wp.vec3),
+    rotation: wp.array(dtype=wp.mat33),
+    tan_half: wp.array(dtype=wp.vec2),
+    far: wp.float32,
+    depth: wp.array(dtype=Any, ndim=3),
+):
+    """One thread a pixel. The ray has unit length along the optical axis, so that its parameter is planar depth."""
+    image, row, column = wp.tid()
+    tan = tan_half[image]
+    left = tan[0] * (1.0 - (2.0 * wp.float32(column) + 1.0) / wp.float32(depth.shape[2]))
+    up = tan[1] * (1.0 - (2.0 * wp.float32(row) + 1.0) / wp.float32(depth.shape[1]))
+    direction = rotation[image] * wp.vec3(1.0, left, up)
+    t = far
+    hit = wp.mesh_query_ray(meshes[world[image]], position[image], direction, far)
+    if hit.result:
+        t = hit.t
+    depth[image, row, column] = depth.dtype(t)
+
+
+@wp.kernel
+@no_type_check
+def cast_rays(
+    meshes: wp.array(dtype=wp.uint64),
+    world: wp.array(dtype=wp.int32),
+    origin: wp.array(dtype=wp.vec3),
+    direction: wp.array(dtype=wp.vec3),
+    far: wp.float32,
+    distance: wp.array(dtype=wp.float32),
+):
+    """The bare kernel that the camera is measured against: given rays, nothing computed around the query."""
+    ray = wp.tid()
+    t = far
+    hit = wp.mesh_query_ray(meshes[world[ray]], origin[ray], direction[ray], far)
+    if hit.result:
+        t = hit.t
+    distance[ray] = t
