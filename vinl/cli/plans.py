@@ -1,0 +1,100 @@
+"""``vinl plans``: list the shipped floor plans, or look at any plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+
+@dataclass(frozen=True)
+class ShowPlan:
+    """Read a floor plan and draw it from above."""
+
+    path: str
+    """PNG, PGM, ROS map YAML, ProcTHOR JSON (file.jsonl.gz:17 for one of many) or the name of a shipped plan."""
+    out: Path | None = None
+    """PNG file for the picture; not drawn if left away."""
+    resolution: float | None = None
+    """Metres per pixel of a bare picture; 0.05 if left away."""
+    min_speck: int = 0
+    """Drop pieces of wall of fewer pixels than this."""
+    obstacles: str = "none"
+    """Clutter to scatter: none, paper or dense."""
+    episodes: int = 0
+    """How many starts and goals to draw, with the way between them."""
+    seed: int = 0
+    """Seed of clutter, starts and goals."""
+
+
+@dataclass(frozen=True)
+class ListPlans:
+    """List the floor plans that travel with the package."""
+
+
+def main(argv: list[str]) -> int:
+    """Run ``vinl plans show PATH`` or ``vinl plans list``.
+
+    Raises:
+        InputError: if the plan or an option cannot be used.
+    """
+    import tyro
+
+    options = tyro.cli(
+        Annotated[ShowPlan, tyro.conf.subcommand("show"), tyro.conf.arg(name="")]  # type: ignore[arg-type]
+        | Annotated[ListPlans, tyro.conf.subcommand("list"), tyro.conf.arg(name="")],
+        args=argv,
+        prog="vinl plans",
+        config=(tyro.conf.PositionalRequiredArgs,),
+    )
+    if isinstance(options, ListPlans):
+        _list_plans()
+    else:
+        _show_plan(options)
+    return 0
+
+
+def _list_plans() -> None:
+    from vinl.world.readers import load_floorplan, shipped_floorplans
+
+    for name in shipped_floorplans():
+        plan = load_floorplan(name)
+        print(f"{name:16} {plan.area_m2:5.0f} m2 free, {len(plan.labels):2} rooms, {len(plan.furniture):3} furniture")
+
+
+def _show_plan(options: ShowPlan) -> None:
+    import numpy as np
+
+    from vinl.config.errors import InputError
+    from vinl.world.clutter import CLUTTER, scatter_blocks
+    from vinl.world.free_space import FreeSpace
+    from vinl.world.geodesic import comfortable_path
+    from vinl.world.readers import load_floorplan
+    from vinl.world.start_goal import sample_start_goals
+
+    if options.obstacles not in CLUTTER:
+        raise InputError(f"--obstacles {options.obstacles}: choose one of {', '.join(CLUTTER)}")
+    if options.seed < 0:
+        raise InputError(f"--seed {options.seed}: give a number, 0 or more")
+    plan = load_floorplan(options.path, options.resolution, options.min_speck)
+    space = FreeSpace(plan)
+    rng = np.random.default_rng(options.seed)
+    pairs = sample_start_goals(plan, options.episodes, rng)
+    points = np.array([point for pair in pairs for point in (pair.start, pair.goal)]).reshape(-1, 2)
+    blocks = scatter_blocks(plan, CLUTTER[options.obstacles], rng, points)
+    rows, columns = plan.frame.shape
+    print(f"{plan.name}: {plan.area_m2:.1f} m2 of free floor in {plan.source}")
+    print(f"  grid      {columns * plan.frame.resolution:.1f} m x {rows * plan.frame.resolution:.1f} m")
+    print(f"  boxes     {len(plan.walls)} of walls, {len(plan.furniture)} of furniture, {len(blocks)} blocks")
+    share = (space.regions == space.largest).sum() / space.traversable.sum()
+    print(f"  regions   {space.regions.max()}; the largest holds {share:.0%} of where the robot can be")
+    for pair in pairs:
+        note = f" ({pair.note})" if pair.note else ""
+        print(f"  episode   {pair.straight_m:.1f} m straight, {pair.geodesic_m:.1f} m on foot{note}")
+    if options.out is not None:
+        from vinl.world.drawing import save_floorplan
+
+        paths = [
+            comfortable_path(space.traversable, space.clearance, plan.frame, pair.start, pair.goal) for pair in pairs
+        ]
+        print(f"  picture   {save_floorplan(plan, options.out, blocks=blocks, start_goals=pairs, paths=paths)}")

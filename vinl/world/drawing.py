@@ -1,0 +1,124 @@
+"""Top views of floor plans."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float
+
+from vinl.config.errors import InputError
+from vinl.world.blocks import Blocks
+from vinl.world.boxes import Boxes
+from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
+from vinl.world.start_goal import StartGoal
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FLOOR, WALL, FURNITURE, EDGE, PANE, BLOCK = "#f6f1e7", "#2f3437", "#d3c1a5", "#9c8767", "#8fc1dd", "#c8553d"
+START, GOAL, PATH = "#2a7f62", "#c8553d", "#1f5fa8"
+
+
+def draw_floorplan(
+    plan: FloorPlan,
+    axes: Axes | None = None,
+    blocks: Blocks | None = None,
+    start_goals: Sequence[StartGoal] = (),
+    paths: Sequence[Float[np.ndarray, "k 2"]] = (),
+    title: str | None = None,
+) -> Figure:
+    """Draw a plan from above: floor, furniture, walls, panes, room names and, if given, what happens in it.
+
+    Args:
+        plan: the floor plan.
+        axes: where to draw; ``None`` makes a figure of its own, to scale.
+        blocks: clutter.
+        start_goals: a dot with its heading for each start, a ring for each goal.
+        paths: lines of points [m].
+        title: over the picture; ``None`` takes the plan's name and free area, "" leaves it away.
+
+    Returns:
+        The figure, not yet saved. It belongs to no window system.
+    """
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
+
+    x, y = plan.frame.centres()
+    half = plan.frame.resolution / 2
+    extent = (x[0] - half, x[-1] + half, y[0] - half, y[-1] + half)
+    if axes is None:
+        scale = 9.0 / max(extent[1] - extent[0], extent[3] - extent[2])
+        size = ((extent[1] - extent[0]) * scale, (extent[3] - extent[2]) * scale + 0.6)
+        axes = Figure(figsize=(max(size[0], 3.0), max(size[1], 2.0)), layout="constrained").add_subplot()
+    axes.imshow(
+        np.where(plan.inside, 1.0, np.nan),
+        extent=extent,
+        origin="lower",
+        cmap=ListedColormap([FLOOR]),
+        interpolation="nearest",
+    )
+
+    def add(boxes: Boxes, face: str, edge: str, width: float, order: float) -> None:
+        if len(boxes):
+            order_by_height = np.argsort(boxes.rows[:, 6], kind="stable")
+            outlines = list(boxes.corners()[order_by_height])
+            axes.add_collection(
+                PolyCollection(outlines, facecolors=face, edgecolors=edge, linewidths=width, zorder=order)
+            )
+
+    high = plan.walls.rows[:, 5] >= BODY_HEIGHT
+    add(Boxes(plan.furniture.rows), FURNITURE, EDGE, 0.7, 2)
+    add(Boxes(plan.walls.rows[~high]), WALL, WALL, 0.3, 3)
+    add(plan.windows, PANE, "white", 0.6, 4)
+    if blocks is not None:
+        add(blocks.boxes(), BLOCK, "white", 0.4, 5)
+    for path in paths:
+        axes.plot(path[:, 0], path[:, 1], color=PATH, linewidth=1.6, zorder=6)
+    for pair in start_goals:
+        ahead = 0.5 * np.array([np.cos(pair.yaw), np.sin(pair.yaw)])
+        axes.plot(*np.stack([pair.start, pair.start + ahead]).T, color=START, linewidth=2, zorder=7)
+        axes.plot(*pair.start, "o", color=START, markersize=7, zorder=7)
+        axes.plot(*pair.goal, "o", color=GOAL, markersize=8, fillstyle="none", markeredgewidth=2, zorder=7)
+    for label in plan.labels:
+        box = {"facecolor": FLOOR, "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
+        axes.text(
+            label.x, label.y, label.name, ha="center", va="center", fontsize=8, color="#555555", bbox=box, zorder=8
+        )
+    if title is None:
+        title = f"{plan.name.replace('_', ' ')}: {plan.area_m2:.0f} m² of free floor"
+    axes.set(xlim=extent[:2], ylim=extent[2:], aspect="equal", title=title)
+    _add_scale_bar(axes, extent)
+    axes.set_axis_off()
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    return figure
+
+
+def save_floorplan(plan: FloorPlan, out: str | Path, dpi: int = 100, **drawn) -> Path:
+    """Draw a plan (arguments as in ``draw_floorplan``) and save it as PNG; folders are made as needed.
+
+    Raises:
+        InputError: if the file cannot be written.
+    """
+    out = Path(out)
+    if out.suffix.lower() != ".png":
+        raise InputError(f"--out {out}: give a name that ends in .png")
+    figure = draw_floorplan(plan, **drawn)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(out, dpi=dpi)
+    except OSError as error:
+        raise InputError(f"--out {out}: cannot be written ({error.strerror}); choose another place") from None
+    return out
+
+
+def _add_scale_bar(axes: Axes, extent: tuple[float, float, float, float]) -> None:
+    """Two metres, lower left."""
+    left, low = extent[0] + 0.1, extent[2] + 0.15
+    axes.plot([left, left + 2], [low, low], color=WALL, linewidth=2, zorder=9)
+    axes.text(left + 1, low + 0.06, "2 m", ha="center", va="bottom", fontsize=7, color=WALL, zorder=9)

@@ -1,0 +1,89 @@
+"""Floor plans from files: pictures, ROS maps, ProcTHOR houses and the plans that travel with the package."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from vinl.config.errors import InputError
+from vinl.config.paths import assets_dir
+from vinl.world.floorplan import FloorPlan
+from vinl.world.readers.image import read_image_plan
+from vinl.world.readers.json_plan import read_json_plan
+from vinl.world.readers.ros_map import read_ros_map
+
+IMAGES = (".png", ".pgm")
+ROS_MAPS = (".yaml", ".yml")
+JSONS = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
+
+__all__ = ["load_floorplan", "load_floorplans", "shipped_floorplans"]
+
+
+def shipped_floorplans() -> list[str]:
+    """Names of the five evaluation plans that travel with the package."""
+    return sorted(path.stem for path in (assets_dir() / "floorplans").glob("*.json"))
+
+
+def load_floorplan(
+    path: str | Path, resolution: float | None = None, min_speck: int = 0, wall_height: float = 2.5
+) -> FloorPlan:
+    """Read a floor plan; the file's ending says how.
+
+    Args:
+        path: ``.png`` or ``.pgm`` picture; ``.yaml`` of a ROS map; ``.json``, ``.jsonl``, ``.jsonl.gz`` in ProcTHOR's
+            format or this package's own, ``:index`` behind it choosing one of several; or the bare name of a shipped
+            plan.
+        resolution: metres per pixel of a bare picture (0.05 if not given); the other kinds carry their own scale.
+        min_speck: pieces of wall of fewer pixels than this are dropped from pictures and ROS maps; 0 keeps all.
+        wall_height: height of walls in pictures and ROS maps [m].
+
+    Raises:
+        InputError: if the file is missing, broken, or holds no floor that the robot can stand on.
+    """
+    text = str(path)
+    if text in shipped_floorplans():
+        text = str(assets_dir() / "floorplans" / f"{text}.json")
+    if resolution is not None and not 0.002 <= resolution <= 2.0:
+        raise InputError(f"--resolution {resolution:g}: give metres per pixel between 0.002 and 2")
+    if min_speck < 0:
+        raise InputError(f"--min-speck {min_speck}: give a number of pixels, 0 or more")
+    if not 0.3 <= wall_height <= 20.0:
+        raise InputError(f"wall height {wall_height:g} m: give metres between 0.3 and 20")
+    file, index = _split_index(text)
+    ending = file.name.lower()
+    if not file.exists():
+        known = ", ".join(shipped_floorplans())
+        raise InputError(f"{text}: no such file; give a path or one of the shipped plans: {known}")
+    if file.is_dir():
+        raise InputError(f"{text}: is a folder; give the files in it, for example {text}/map.yaml")
+    if ending.endswith(JSONS):
+        return read_json_plan(file, index)
+    if index is not None:
+        raise InputError(f"{text}: only JSON files hold several plans; leave :{index} away")
+    if ending.endswith(ROS_MAPS):
+        return read_ros_map(file, min_speck, wall_height)
+    if ending.endswith(IMAGES):
+        return read_image_plan(file, resolution, min_speck, wall_height)
+    raise InputError(f"{text}: unknown kind of floor plan; known are {', '.join(IMAGES + ROS_MAPS + JSONS)}")
+
+
+def load_floorplans(
+    paths: Sequence[str | Path], resolution: float | None = None, min_speck: int = 0, wall_height: float = 2.5
+) -> list[FloorPlan]:
+    """Read several floor plans, the shipped ones if none are named; see ``load_floorplan``."""
+    return [load_floorplan(path, resolution, min_speck, wall_height) for path in paths or shipped_floorplans()]
+
+
+def _split_index(text: str) -> tuple[Path, int | None]:
+    """``houses.jsonl.gz:17`` -> the file and 17. A file that really is called so comes first."""
+    head, colon, tail = text.rpartition(":")
+    if not colon or Path(text).exists():
+        return Path(text), None
+    if head.lower().endswith(JSONS):
+        try:
+            return Path(head), int(tail)
+        except ValueError:
+            raise InputError(f"{text}: behind the colon stands the number of a plan, from 0 on") from None
+    if tail.isdigit():
+        return Path(head), int(tail)
+    return Path(text), None

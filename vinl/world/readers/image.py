@@ -1,0 +1,139 @@
+"""Floor plans from pictures: walls are what is drawn, by opacity or by darkness."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, UInt8
+from PIL import Image, UnidentifiedImageError
+
+from vinl.config.errors import InputError
+from vinl.world.boxes import Boxes
+from vinl.world.floorplan import RESOLUTION, FloorPlan, assemble_floorplan, frame_around
+from vinl.world.raster import drop_specks, paint_boxes, split_rectangles
+from vinl.world.readers.enclosure import find_inside
+
+DEFAULT_RESOLUTION = 0.05
+"""Metres per pixel of a picture that comes without a scale: the usual one of laser-scanned maps."""
+
+DARK = 128
+"""Grey values below this are walls."""
+
+MAX_PIXELS = 50_000_000
+
+
+def read_image_plan(file: Path, resolution: float | None, min_speck: int, wall_height: float) -> FloorPlan:
+    """Read a bare picture; its lower left corner is the origin.
+
+    Where the picture has transparent parts, walls are its opaque pixels; but if most of what is opaque is light, the
+    light is floor, the dark is wall and the transparent is outside. Without transparency, dark is wall.
+
+    Args:
+        file: picture.
+        resolution: metres per pixel; 0.05 if not given.
+        min_speck: pieces of fewer pixels are dropped.
+        wall_height: height of the walls [m].
+
+    Raises:
+        InputError: if the picture cannot be read, is empty, or encloses no floor.
+    """
+    colour, alpha = read_pixels(file)
+    if alpha.min() == 255:
+        walls = colour < DARK
+        rule = "dark"
+    else:
+        opaque = alpha >= DARK
+        dark = opaque & (colour < DARK)
+        drawn = dark.any() and (opaque & ~dark).sum() > 0.5 * opaque.sum()
+        walls, rule = (dark, "dark") if drawn else (opaque, "opaque")
+    if not walls.any():
+        raise InputError(f"{file}: the picture is empty: it has no {rule} pixels, which would be the walls")
+    if walls.all():
+        raise InputError(f"{file}: the whole picture is wall: all its pixels are {rule}; floor is light or transparent")
+    return build_from_pixels(
+        file, walls, None, DEFAULT_RESOLUTION if resolution is None else resolution, min_speck, wall_height
+    )
+
+
+def read_pixels(file: Path) -> tuple[UInt8[np.ndarray, "rows columns"], UInt8[np.ndarray, "rows columns"]]:
+    """Grey values (mean of the colours) and opacity of a picture, 0-255, top row first.
+
+    Raises:
+        InputError: if the picture cannot be read.
+    """
+    try:
+        with Image.open(file) as picture:
+            if picture.width * picture.height > MAX_PIXELS:
+                raise InputError(f"{file}: {picture.width} x {picture.height} pixels are too many; scale it down")
+            if picture.mode.startswith(("I", "F")):
+                grey = np.asarray(picture, dtype=np.float64)
+                top = 65535.0 if grey.max() > 255 else 255.0
+                return (grey / top * 255).astype(np.uint8), np.full(grey.shape, 255, np.uint8)
+            pixels = np.asarray(picture.convert("RGBA"))
+    except UnidentifiedImageError:
+        raise InputError(f"{file}: this is not a picture that can be read; save it as PNG or PGM") from None
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{file}: the picture is damaged ({error}); save it again as PNG or PGM") from None
+    return np.rint(pixels[..., :3].mean(-1)).astype(np.uint8), pixels[..., 3]
+
+
+def build_from_pixels(
+    file: Path,
+    walls: Bool[np.ndarray, "rows columns"],
+    known: Bool[np.ndarray, "rows columns"] | None,
+    resolution: float,
+    min_speck: int,
+    wall_height: float,
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> FloorPlan:
+    """A floor plan from a mask of walls, top row first.
+
+    Args:
+        file: for messages and the name.
+        walls: pixels that are walls.
+        known: pixels that are known to be floor; ``None`` where nothing is unknown.
+        resolution: metres per pixel.
+        min_speck: pieces of wall of fewer pixels are dropped.
+        wall_height: height of the walls [m].
+        origin: x [m], y [m], yaw [rad] of the picture's lower left corner.
+    """
+    walls = drop_specks(walls, min_speck)[::-1]
+    if not walls.any():
+        raise InputError(f"{file}: no wall is left after dropping specks of fewer than {min_speck} pixels")
+    x, y, yaw = origin
+    c, s = np.cos(yaw), np.sin(yaw)
+    size = np.array(walls.shape[::-1]) * resolution
+    edges = np.array([[0, 0], [size[0], 0], [0, size[1]], [size[0], size[1]]]) @ np.array([[c, s], [-s, c]]) + [x, y]
+    frame = frame_around(edges.min(0), edges.max(0), str(file))
+    first_row, first_column, last_row, last_column = split_rectangles(walls).T * resolution
+    u, v = (first_column + last_column) / 2, (first_row + last_row) / 2
+    n = np.ones(len(u))
+    rows = [x + c * u - s * v, y + s * u + c * v, n * yaw]
+    rows += [last_column - first_column, last_row - first_row, n * 0.0, n * wall_height]
+    boxes = Boxes(np.column_stack(rows))
+    solid = paint_boxes(boxes, frame)
+    inside = find_inside(solid, RESOLUTION)
+    if known is not None:
+        floor = _look_up(known[::-1], frame, resolution, origin)
+        inside &= floor
+        if inside.sum() < 0.3 * floor.sum():
+            # much of the floor borders on the unknown and not on walls, so the unknown stands for the missing walls
+            fenced = find_inside(solid | ~floor, RESOLUTION) & floor
+            inside = fenced if fenced.sum() > inside.sum() else inside
+    # every second ROS map is called map.yaml: the folder tells them apart
+    name = file.absolute().parent.name if file.stem == "map" else file.stem
+    return assemble_floorplan(name, str(file), boxes, Boxes.empty(), inside, frame)
+
+
+def _look_up(mask: np.ndarray, frame, resolution: float, origin: tuple[float, float, float]) -> np.ndarray:
+    """The pixel under each cell's centre; false off the picture."""
+    x, y = frame.centres()
+    dx, dy = x[None] - origin[0], y[:, None] - origin[1]
+    c, s = np.cos(origin[2]), np.sin(origin[2])
+    column = np.floor((c * dx + s * dy) / resolution).astype(int)
+    row = np.floor((c * dy - s * dx) / resolution).astype(int)
+    held = (row >= 0) & (row < mask.shape[0]) & (column >= 0) & (column < mask.shape[1])
+    return held & mask[np.clip(row, 0, mask.shape[0] - 1), np.clip(column, 0, mask.shape[1] - 1)]

@@ -1,0 +1,104 @@
+"""JSON files of floor plans: one plan, a list of plans, or one plan a line; plain or gzip."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import zlib
+from pathlib import Path
+from typing import Any
+
+from vinl.config.errors import InputError
+from vinl.world.floorplan import FloorPlan
+from vinl.world.readers.own import SCHEMA, build_own_plan
+from vinl.world.readers.procthor import build_procthor_plan
+
+
+def read_json_plan(file: Path, index: int | None) -> FloorPlan:
+    """Read plan number ``index`` (from 0 on; the first if ``None``) of a file in ProcTHOR's format or our own.
+
+    Raises:
+        InputError: if the file is broken, holds no such plan, or the plan has no floor for the robot.
+    """
+    packed = file.name.lower().endswith(".gz")
+    bare = file.name.lower().removesuffix(".gz")
+    house, count = _pick_line(file, packed, index or 0) if bare.endswith(".jsonl") else _pick(file, packed, index or 0)
+    if not isinstance(house, dict):
+        raise InputError(f"{file}: not a floor plan; a JSON object with 'rooms' and 'walls' is needed")
+    several = index is not None or (count or 2) > 1
+    stem = file.name[: -len(".jsonl.gz")] if bare.endswith(".jsonl") and packed else Path(bare).stem
+    name = f"{stem}:{index or 0}" if several else stem
+    source = f"{file}:{index or 0}" if several else str(file)
+    try:
+        if house.get("schema") is not None:
+            if house["schema"] != SCHEMA:
+                raise InputError(f"{source}: unknown schema '{house['schema']}'; this version reads '{SCHEMA}'")
+            return build_own_plan(house, name, source)
+        if "rooms" not in house or "walls" not in house:
+            raise InputError(f"{source}: not a floor plan; a ProcTHOR house has 'rooms' and 'walls'")
+        return build_procthor_plan(house, name, source, file.parent / "asset_bbox.json")
+    except (KeyError, TypeError, IndexError, AttributeError) as error:
+        raise InputError(f"{source}: the plan lacks an entry or has one of the wrong kind ({error!r})") from None
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise error if str(file) in str(error) else InputError(f"{source}: {error}") from None
+        raise InputError(f"{source}: the plan has a broken number ({error})") from None
+
+
+def _open_text(file: Path, packed: bool):
+    return gzip.open(file, "rt", encoding="utf-8") if packed else file.open(encoding="utf-8")
+
+
+def _explain(file: Path, error: Exception) -> InputError:
+    if isinstance(error, EOFError | zlib.error):
+        return InputError(f"{file}: the gzip file is cut off or damaged; fetch it again")
+    if isinstance(error, gzip.BadGzipFile):
+        return InputError(f"{file}: not a gzip file; name it .json or .jsonl if it is plain text")
+    if isinstance(error, UnicodeDecodeError):
+        return InputError(f"{file}: not a text file; JSON in UTF-8 is needed")
+    return InputError(f"{file}: cannot be read ({error})")
+
+
+def _parse(text: str, where: str) -> Any:
+    try:
+        return json.loads(text)
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise InputError(f"{where}: broken JSON ({error}); is the file complete?") from None
+
+
+def _pick_line(file: Path, packed: bool, index: int) -> tuple[Any, int | None]:
+    """One line of JSON lines and, if the file ended there, how many there are."""
+    _check_index(file, index, None)
+    count = 0
+    try:
+        with _open_text(file, packed) as lines:
+            for line in lines:
+                if not line.strip():
+                    continue
+                if count == index:
+                    return _parse(line, f"{file}:{index}"), None
+                count += 1
+    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
+        raise _explain(file, error) from None
+    _check_index(file, index, count)
+    raise AssertionError("the index was counted wrongly")
+
+
+def _pick(file: Path, packed: bool, index: int) -> tuple[Any, int]:
+    """One plan of a JSON file that holds one or a list, and how many it holds."""
+    try:
+        with _open_text(file, packed) as stream:
+            content = _parse(stream.read(), str(file))
+    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
+        raise _explain(file, error) from None
+    plans = content if isinstance(content, list) else [content]
+    _check_index(file, index, len(plans))
+    return plans[index], len(plans)
+
+
+def _check_index(file: Path, index: int, count: int | None) -> None:
+    if count == 0:
+        raise InputError(f"{file}: the file is empty; it should hold a floor plan")
+    if index < 0 or (count is not None and index >= count):
+        last = f"0 to {count - 1}" if count else "0 on"
+        raise InputError(f"{file}:{index}: no plan with this number; they go from {last}")

@@ -1,0 +1,85 @@
+"""Walls as lines with openings, turned into boxes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+ON_LINE = 0.05
+"""Two walls on parallel lines nearer than this [m] are one wall seen from its two sides."""
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A straight wall. Ends and thickness in metres, ``height`` above the floor."""
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    thickness: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A doorway: a stretch of a wall's middle line that is open from the floor up to ``height`` [m]."""
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    height: float
+
+
+def raise_walls(walls: list[Wall], openings: list[Opening]) -> np.ndarray:
+    """Rows of boxes (see ``Boxes``), shape (n, 7): what is left of each wall beside its openings, and the lintels.
+
+    An opening is cut out of every wall that runs along the same line, so of both twins of a wall between two rooms.
+    Twins that say the same twice give one box.
+    """
+    rows: list[list[float]] = []
+    for wall in walls:
+        start, end = np.array(wall.start), np.array(wall.end)
+        length = float(np.linalg.norm(end - start))
+        if length < 1e-6:
+            continue
+        along = (end - start) / length
+        across = np.array([-along[1], along[0]])
+        # one direction for both twins, so that equal boxes are equal rows
+        yaw = float(np.arctan2(along[1], along[0])) % np.pi
+        yaw = 0.0 if np.pi - yaw < 1e-9 else yaw
+        cuts = []
+        for opening in openings:
+            ends = np.array([opening.start, opening.end]) - start
+            if np.abs(ends @ across).max() > max(ON_LINE, wall.thickness / 2):
+                continue
+            low, high = np.clip(np.sort(ends @ along), 0.0, length)
+            if high - low > 1e-6:
+                cuts.append((float(low), float(high), opening.height))
+        pieces = [(low, high, 0.0) for low, high in _subtract(length, cuts)]
+        # a stretch that ends at the wall's own end also fills the corner with the next wall
+        grown = [
+            (
+                low - (wall.thickness / 2 if low < 1e-6 else 0.0),
+                high + (wall.thickness / 2 if high > length - 1e-6 else 0),
+                b,
+            )
+            for low, high, b in pieces
+        ]
+        grown += [(low, high, top) for low, high, top in cuts if wall.height - top > 0.01]
+        for low, high, bottom in grown:
+            x, y = start + along * (low + high) / 2
+            rows.append([float(x), float(y), yaw, high - low, wall.thickness, bottom, wall.height])
+    table = np.array(rows).reshape(-1, 7)
+    _, first = np.unique(np.round(table, 3), axis=0, return_index=True)
+    return table[np.sort(first)]
+
+
+def _subtract(length: float, cuts: list[tuple[float, float, float]]) -> list[tuple[float, float]]:
+    """What is left of the stretch from 0 to ``length``."""
+    left, at = [], 0.0
+    for low, high, _ in sorted(cuts):
+        if low - at > 1e-3:
+            left.append((at, low))
+        at = max(at, high)
+    if length - at > 1e-3:
+        left.append((at, length))
+    return left

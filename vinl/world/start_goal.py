@@ -1,0 +1,105 @@
+"""Start and goal of an episode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import ConvexHull, QhullError
+
+from vinl.config.errors import InputError
+from vinl.world.floorplan import ROOM_TO_STAND, FloorPlan
+from vinl.world.free_space import FreeSpace
+from vinl.world.geodesic import distance_field
+
+_TRIES = 200
+
+
+@dataclass(frozen=True, eq=False)
+class StartGoal:
+    """Where an episode begins and where it should end.
+
+    Attributes:
+        start: shape (2,), start of the robot's middle [m].
+        yaw: heading at the start [rad].
+        goal: shape (2,), goal [m].
+        geodesic_m: shortest way over the free floor eroded by the robot's footprint [m].
+        straight_m: straight distance [m].
+        note: why the distance or the clearance is less than was asked for; empty if it is not.
+    """
+
+    start: Float[np.ndarray, " 2"]
+    yaw: float
+    goal: Float[np.ndarray, " 2"]
+    geodesic_m: float
+    straight_m: float
+    note: str = ""
+
+
+def sample_start_goals(
+    plan: FloorPlan, n: int, rng: np.random.Generator, min_distance: float = 5.0, clearance: float = 0.5
+) -> list[StartGoal]:
+    """Draw pairs of start and goal, both in the largest connected region of the traversable floor.
+
+    Pairs are uniform among those that keep the straight distance and the clearance. If no spot of the plan has the
+    clearance, 0.4 m (the robot can still turn) takes its place; if no two spots are ``min_distance`` apart, 90 % of
+    the plan's largest distance does; the pair's note says so.
+
+    Args:
+        plan: the floor plan.
+        n: how many pairs.
+        rng: the only source of chance: the same generator state gives the same pairs.
+        min_distance: least straight distance [m].
+        clearance: least distance of start and goal to walls, furniture and the outside [m].
+
+    Raises:
+        InputError: if the plan has no room for the robot to stand, or a number asked for is not sensible.
+    """
+    if n < 0 or not min_distance >= 0 or not clearance >= 0:
+        raise InputError("start and goal: number, distance and clearance must not be negative")
+    space = FreeSpace(plan)
+    notes = []
+    cells = np.argwhere((space.regions == space.largest) & (space.clearance >= clearance))
+    if len(cells) < 2:
+        cells = np.argwhere((space.regions == space.largest) & (space.clearance >= min(ROOM_TO_STAND, clearance)))
+        notes.append(f"no clearance of {clearance:.2f} m, {ROOM_TO_STAND:.2f} m instead")
+    if len(cells) < 2:
+        raise InputError(f"{plan.source}: the plan is too small for the robot: no room to start and to arrive")
+    spots = plan.frame.xy(cells)
+    widest = _measure_extent(spots)
+    if widest < min_distance:
+        min_distance = 0.9 * widest
+        notes.append(f"start and goal are at most {widest:.1f} m apart in this plan")
+    pairs = []
+    for _ in range(n):
+        start, goal = _draw_pair(spots, min_distance, rng)
+        yaw = float(rng.uniform(-np.pi, np.pi))
+        straight = float(np.linalg.norm(goal - start))
+        field = distance_field(space.traversable, plan.frame, goal)
+        row, column = plan.frame.cell(start)
+        geodesic = max(float(field[row, column]), straight)
+        pairs.append(StartGoal(start, yaw, goal, geodesic, straight, "; ".join(notes)))
+    return pairs
+
+
+def _draw_pair(spots: np.ndarray, distance: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    for _ in range(_TRIES):
+        start, goal = spots[rng.integers(len(spots), size=2)]
+        if np.linalg.norm(goal - start) >= distance:
+            return start, goal
+    # such pairs are rare: go through the spots until one has a partner far enough away
+    for k in rng.permutation(len(spots)):
+        far = np.flatnonzero(np.linalg.norm(spots - spots[k], axis=1) >= distance)
+        if len(far):
+            return spots[k], spots[rng.choice(far)]
+    raise AssertionError("the extent of the spots was measured wrongly")
+
+
+def _measure_extent(spots: Float[np.ndarray, "m 2"]) -> float:
+    """Largest distance between two of the points."""
+    try:
+        corners = spots[ConvexHull(spots).vertices]
+    except QhullError:  # all on one line
+        corners = spots[[np.lexsort(spots.T)[0], np.lexsort(spots.T)[-1]]]
+    return float(np.linalg.norm(corners[:, None] - corners[None], axis=-1).max())
