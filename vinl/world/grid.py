@@ -35,7 +35,7 @@ class GridFrame:
         cell = np.asarray(cell)
         return np.stack([self.x0 + cell[..., 1] * self.resolution, self.y0 + cell[..., 0] * self.resolution], -1)
 
-    def centres(self) -> tuple[Float[np.ndarray, "columns"], Float[np.ndarray, "rows"]]:
+    def centres(self) -> tuple[Float[np.ndarray, " columns"], Float[np.ndarray, " rows"]]:
         """x of every column and y of every row [m]."""
         return (
             self.x0 + np.arange(self.shape[1]) * self.resolution,

@@ -35,7 +35,8 @@ class HeightField:
     def __post_init__(self) -> None:
         if self.heights.shape != self.frame.shape or self.labels.shape != self.frame.shape:
             raise InputError(
-                f"height field: heights {self.heights.shape}, labels {self.labels.shape} and frame {self.frame.shape} differ"
+                f"height field: shapes of heights {self.heights.shape}, labels {self.labels.shape} and frame "
+                f"{self.frame.shape} differ"
             )
         if not np.isfinite(self.heights).all():
             raise InputError("height field holds a height that is not finite")

@@ -127,9 +127,9 @@ def discrete_tile(difficulty: float, rng: np.random.Generator) -> Float[np.ndarr
     """Twenty slabs and pits with sides of 1, 1.4 or 1.8 m and heights up to 0.05 + 0.2 x difficulty [legged_gym]."""
     heights, h = np.zeros((CELLS, CELLS)), 0.05 + 0.2 * difficulty
     for _ in range(20):
-        w, l = rng.choice([20, 28, 36], 2)
-        i, j = rng.integers(0, (CELLS - w) // 8 + 1) * 8, rng.integers(0, (CELLS - l) // 8 + 1) * 8
-        heights[i : i + w, j : j + l] = rng.choice([h, -h, h / 2, -h / 2])
+        w, d = rng.choice([20, 28, 36], 2)
+        i, j = rng.integers(0, (CELLS - w) // 8 + 1) * 8, rng.integers(0, (CELLS - d) // 8 + 1) * 8
+        heights[i : i + w, j : j + d] = rng.choice([h, -h, h / 2, -h / 2])
     heights[_radius() < 1.5] = 0.0
     return heights
 
@@ -187,6 +187,7 @@ def build_terrain(config: TerrainConfig) -> Terrain:
             difficulty = k / config.levels
             i, j = border + c * CELLS, border + k * CELLS
             middle = frame.xy(np.array([i, j])) + TILE / 2
+            shift = np.array([*middle, 0, 0, 0, 0, 0])
             starts[k, c, :2] = middle
             tiles: dict[str, Callable[[], np.ndarray]] = {
                 "slope": lambda d=difficulty, up=up: slope_tile(d, up),
@@ -204,10 +205,10 @@ def build_terrain(config: TerrainConfig) -> Terrain:
                 here = scatter_centres(rng, count, TILE / 2 - 0.3, 1.0, 1.2, none)
                 boxes = [draw_tall(rng, here[::2], long=True), draw_tall(rng, here[1::2], long=False)]
                 # a wall is long: those that would reach into the start are left out
-                tall += [Boxes(b.rows + [*middle, 0, 0, 0, 0, 0]) for b in map(_off_the_start, boxes)]
+                tall += [Boxes(b.rows + shift) for b in map(_off_the_start, boxes)]
             else:
                 here = scatter_centres(rng, round(config.tall_density * TILE**2) if k else 0, 3.7, 1.5, 1.5, none)
-                tall.append(Boxes(draw_tall(rng, here, long=False).rows + [*middle, 0, 0, 0, 0, 0]))
+                tall.append(Boxes(draw_tall(rng, here, long=False).rows + shift))
                 count = round(config.block_density * TILE**2 * k / max(config.levels - 1, 1))
                 centres = scatter_centres(rng, count, TILE / 2, config.start_clear + 0.3, 0.45, here)
                 blocks.append(draw_blocks(rng, centres + middle, config.block_height))

@@ -1,0 +1,85 @@
+"""``vinl train-loco``: train a locomotor."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+
+from vinl.config.errors import InputError
+
+
+@dataclass(frozen=True)
+class Options:
+    """Train a locomotor with PPO in MJX. The run's folder holds checkpoint, curves and, at any time, the policy.
+
+    Ctrl-C saves and stops; --resume goes on. Any setting of the config can be given as key=value, for example
+    ppo.epochs=3 or commands.forward='[0, 1]'.
+    """
+
+    overrides: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    """Settings of the config as key=value."""
+    stage: int = 1
+    """1: walk on rough ground with the height scan."""
+    config: str | None = None
+    """Name of a shipped config or a YAML file; default: the stage's own."""
+    out: str | None = None
+    """Folder of the new run (default: runs/ and the config's name)."""
+    resume: str | None = None
+    """Folder of a run to go on with; its own config is used."""
+    device: str = "auto"
+    """cpu, cuda, or auto: cuda where there is one."""
+    num_envs: int | None = None
+    """Robots in parallel (default: the config's, 4096)."""
+    iterations: int | None = None
+    """Updates in all (default: the config's)."""
+    seed: int | None = None
+    """Of everything random (default: the config's)."""
+    save_every: float = 60.0
+    """Seconds between checkpoints."""
+
+
+STAGES = {1: "loco/rough"}
+
+
+def main(argv: list[str]) -> int:
+    """Run the command; returns 130 after an interrupt."""
+    options = tyro.cli(Options, args=argv, prog="vinl train-loco")
+    if options.stage not in STAGES:
+        raise InputError(f"--stage {options.stage} does not exist; choose {', '.join(map(str, STAGES))}")
+    if options.save_every <= 0:
+        raise InputError(f"--save-every must be positive, got {options.save_every}")
+    if options.resume and (options.overrides or options.config or options.out or options.num_envs or options.seed):
+        raise InputError("--resume goes on with the run's own config; only --iterations and --device may be given")
+    from vinl.policies.device import choose_device
+
+    device = options.device
+    if device == "auto":
+        import torch
+
+        device = "cuda" if torch.cuda.is_available() else "cpu"
+    choose_device(device)
+    os.environ.setdefault("JAX_PLATFORMS", "cpu" if device == "cpu" else "cuda,cpu")
+
+    from vinl.config.loader import load_config
+    from vinl.loco.config import LocoConfig
+    from vinl.loco.training import train_locomotor
+
+    if options.resume:
+        folder, config = options.resume, None
+    else:
+        source = options.config or STAGES[options.stage]
+        short = {"num_envs": options.num_envs, "iterations": options.iterations, "seed": options.seed}
+        overrides = [*options.overrides, *(f"{k}={v}" for k, v in short.items() if v is not None)]
+        config = load_config(LocoConfig, source, overrides)
+        folder = options.out or f"runs/{source.removesuffix('.yaml').split('/')[-1]}"
+    if options.iterations is not None and options.iterations < 1:
+        raise InputError(f"--iterations must be at least 1, got {options.iterations}")
+    complete = train_locomotor(config, folder, device, save_every=options.save_every, iterations=options.iterations)
+    if complete:
+        print(f"trained: {folder}/policy  (try: vinl eval --loco {folder})")
+        return 0
+    print(f"stopped and saved: go on with  vinl train-loco --resume {folder}")
+    return 130

@@ -1,0 +1,236 @@
+"""Everything that a locomotion training can be told, as frozen records; the values live in ``configs/loco/*.yaml``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from vinl.config.errors import InputError
+from vinl.robot.aliengo import KD, KP
+from vinl.world.terrain import TerrainConfig
+
+Range = tuple[float, float]
+
+
+def _check_range(name: str, value: Range) -> None:
+    if not value[0] <= value[1]:
+        raise InputError(f"{name} must be a rising range, got {value[0]} to {value[1]}")
+
+
+@dataclass(frozen=True)
+class CommandConfig:
+    """Velocity commands, drawn uniformly and held for a while.
+
+    Attributes:
+        forward, left: ranges of the linear velocity [m/s].
+        yaw_rate: range of the turning rate [rad/s].
+        hold: range of the time until the next command [s].
+        min_speed: slower linear commands become zero [m/s] [legged_gym: 0.2].
+        stand_share: share of commands that are zero.
+        turn_share: share of commands that only turn on the spot.
+    """
+
+    forward: Range = (-1.0, 1.0)
+    left: Range = (-1.0, 1.0)
+    yaw_rate: Range = (-1.0, 1.0)
+    hold: Range = (2.0, 10.0)
+    min_speed: float = 0.2
+    stand_share: float = 0.05
+    turn_share: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name in ("forward", "left", "yaw_rate", "hold"):
+            _check_range(f"commands.{name}", getattr(self, name))
+        if self.hold[0] <= 0:
+            raise InputError(f"commands.hold must be positive, got {self.hold[0]}")
+        if not 0 <= self.stand_share + self.turn_share <= 1:
+            raise InputError("commands.stand_share and turn_share must be shares that add up to at most 1")
+
+
+@dataclass(frozen=True)
+class RewardConfig:
+    """Weights of the reward terms, for each second (they are multiplied by the control step) [ViNL code, section 2].
+
+    Attributes:
+        linear_velocity: exp(-error^2 / sigma) of the commanded velocity in the plane.
+        yaw_rate: exp(-error^2 / sigma) of the commanded turning rate.
+        vertical_velocity: vertical speed squared.
+        roll_pitch_rate: squared rates of roll and pitch.
+        torque: squared joint torques.
+        joint_acceleration: squared joint accelerations.
+        action_rate: squared change of the action.
+        collision: shanks and trunk that touch anything.
+        air_time: seconds over 0.5 that a foot was in the air, at touch-down.
+        obstacle_contact: feet and shanks that touch a block or wall.
+        orientation: squared tilt of the trunk.
+        stand_still: joint angles away from the default pose while told to stand.
+        fall: one fall (not multiplied by the control step).
+        sigma: width of the tracking terms [(m/s)^2].
+        clip_at_zero: hold the sum of a step to at least zero [legged_gym].
+    """
+
+    linear_velocity: float = 1.0
+    yaw_rate: float = 0.5
+    vertical_velocity: float = -2.0
+    roll_pitch_rate: float = -0.05
+    torque: float = -1e-5
+    joint_acceleration: float = -2.5e-7
+    action_rate: float = -0.01
+    collision: float = -1.0
+    air_time: float = 1.0
+    obstacle_contact: float = 0.0
+    orientation: float = 0.0
+    stand_still: float = 0.0
+    fall: float = 0.0
+    sigma: float = 0.25
+    clip_at_zero: bool = True
+
+    def __post_init__(self) -> None:
+        if self.sigma <= 0:
+            raise InputError(f"rewards.sigma must be positive, got {self.sigma}")
+
+
+@dataclass(frozen=True)
+class RandomisationConfig:
+    """What differs from robot to robot and from start to start.
+
+    Attributes:
+        friction: range of the feet's friction [ViNL config: 0.5-1.25].
+        added_mass: range of the mass added to the trunk [kg] [ViNL config: +-5, on a robot 4.3 kg lighter].
+        push_speed: pushes set the trunk's velocity in the plane to a random one up to this [m/s].
+        push_interval: time between pushes [s] [ViNL config: 15].
+        start_xy: half-width of the square that robots start in [m].
+        start_joints: joint angles start within this share of the default pose.
+        start_height: height of the trunk over the highest ground near the start [m].
+        start_velocity: largest velocity of the trunk at the start [m/s and rad/s] [ViNL code: 0.5].
+        observation_noise: multiplier of the noise in the observation table.
+    """
+
+    friction: Range = (0.5, 1.25)
+    added_mass: Range = (-5.0, 3.0)
+    push_speed: float = 1.0
+    push_interval: float = 15.0
+    start_xy: float = 0.6
+    start_joints: float = 0.15
+    start_height: float = 0.42
+    start_velocity: float = 0.5
+    observation_noise: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_range("randomisation.friction", self.friction)
+        _check_range("randomisation.added_mass", self.added_mass)
+        if self.friction[0] <= 0:
+            raise InputError("randomisation.friction must be positive")
+        if self.push_interval <= 0:
+            raise InputError("randomisation.push_interval must be positive")
+        if self.observation_noise < 0:
+            raise InputError("randomisation.observation_noise must not be negative")
+
+
+@dataclass(frozen=True)
+class CurriculumConfig:
+    """When a robot moves to a harder or an easier tile.
+
+    The measure is progress along the command, because a command that turns the robot in circles never takes it far.
+
+    Attributes:
+        first_level: robots start on a random level up to this [legged_gym: 5].
+        promote: share of the commanded way that promotes.
+        demote: share of the commanded way that demotes when not reached.
+        min_way: episodes with less commanded way than this [m] change nothing.
+    """
+
+    first_level: int = 5
+    promote: float = 0.75
+    demote: float = 0.5
+    min_way: float = 2.0
+
+    def __post_init__(self) -> None:
+        if self.first_level < 0:
+            raise InputError("curriculum.first_level must not be negative")
+        if not 0 <= self.demote <= self.promote:
+            raise InputError("curriculum: need 0 <= demote <= promote")
+
+
+@dataclass(frozen=True)
+class PpoConfig:
+    """Proximal policy optimisation [legged_gym].
+
+    Attributes:
+        steps: control steps of each robot between updates.
+        epochs, minibatches: passes over the roll-out and parts of each.
+        learning_rate: at the start; adapts to the divergence.
+        desired_kl: divergence that the learning rate is steered to.
+        gamma, lam: discount and GAE factor.
+        clip: of the probability ratio and of the value.
+        entropy: weight of the entropy bonus.
+        value: weight of the value loss.
+        max_grad_norm: gradients are clipped to this norm.
+        init_std: standard deviation of the actions at the start.
+        actor, critic, encoder: widths of the hidden layers.
+        code: size of the map code that the encoder makes of the height scan [paper III-A].
+    """
+
+    steps: int = 24
+    epochs: int = 5
+    minibatches: int = 4
+    learning_rate: float = 1e-3
+    desired_kl: float = 0.01
+    gamma: float = 0.99
+    lam: float = 0.95
+    clip: float = 0.2
+    entropy: float = 0.01
+    value: float = 1.0
+    max_grad_norm: float = 1.0
+    init_std: float = 1.0
+    actor: tuple[int, ...] = (512, 256, 128)
+    critic: tuple[int, ...] = (512, 256, 128)
+    encoder: tuple[int, ...] = (128, 64)
+    code: int = 32
+
+    def __post_init__(self) -> None:
+        if min(self.steps, self.epochs, self.minibatches) < 1:
+            raise InputError("ppo: steps, epochs and minibatches must be at least 1")
+        if self.learning_rate <= 0 or self.desired_kl <= 0 or self.init_std <= 0:
+            raise InputError("ppo: learning_rate, desired_kl and init_std must be positive")
+        if not 0 < self.gamma <= 1 or not 0 <= self.lam <= 1:
+            raise InputError("ppo: gamma must lie in (0, 1] and lam in [0, 1]")
+
+
+@dataclass(frozen=True)
+class LocoConfig:
+    """One locomotion training.
+
+    Attributes:
+        stage: 1 (rough ground) for now.
+        num_envs: robots in parallel.
+        iterations: updates.
+        seed: of everything random.
+        episode_length: [s] [ViNL config: 20].
+        kp, kd: joint gains [N m / rad, N m s / rad].
+    """
+
+    stage: int = 1
+    num_envs: int = 4096
+    iterations: int = 1000
+    seed: int = 1
+    episode_length: float = 20.0
+    kp: float = KP
+    kd: float = KD
+    terrain: TerrainConfig = field(default_factory=TerrainConfig)
+    commands: CommandConfig = field(default_factory=CommandConfig)
+    rewards: RewardConfig = field(default_factory=RewardConfig)
+    randomisation: RandomisationConfig = field(default_factory=RandomisationConfig)
+    curriculum: CurriculumConfig = field(default_factory=CurriculumConfig)
+    ppo: PpoConfig = field(default_factory=PpoConfig)
+
+    def __post_init__(self) -> None:
+        if self.stage not in (1,):
+            raise InputError(f"stage {self.stage} does not exist; choose 1")
+        if not 1 <= self.num_envs <= 65536:
+            raise InputError(f"num_envs must lie between 1 and 65536, got {self.num_envs}")
+        if self.iterations < 1:
+            raise InputError(f"iterations must be at least 1, got {self.iterations}")
+        if self.episode_length <= 0:
+            raise InputError(f"episode_length must be positive, got {self.episode_length}")
+        if self.kp <= 0 or self.kd < 0:
+            raise InputError("kp must be positive and kd not negative")

@@ -1,0 +1,366 @@
+"""The 50 Hz locomotion environment: thousands of robots on one terrain, one compiled step for all of them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, UInt8
+
+from vinl.loco.commands import DRAWS, between, draw_commands
+from vinl.loco.config import LocoConfig
+from vinl.loco.curriculum import next_levels
+from vinl.loco.rewards import Motion, reward_terms
+from vinl.loco.simulation import Body, Contacts, Ground, Simulation
+from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
+from vinl.robot.observation import CLIP, NOISE, OBSERVATION_SIZE, observe
+from vinl.robot.rotation import rotate_inverse
+from vinl.sensing.height_scan import scan_ground
+from vinl.world.terrain import build_terrain
+
+_EDGE = 2.0
+"""An episode ends as by time this near to the edge of the terrain [m]."""
+
+_MAX_SPEED = 150.0
+"""A joint faster than this [rad/s] means that the physics blew up."""
+
+_UPSIDE = -0.3
+"""Third component of the gravity vector in the trunk above which the robot has fallen: tilted by more than 72 deg."""
+
+MEASURES = (
+    "steps",
+    "reward",
+    "linear_tracking",
+    "yaw_tracking",
+    "linear_error2",
+    "yaw_error2",
+    "metres",
+    "falls",
+    "timeouts",
+    "episode_steps",
+    "foot_block",
+    "shank_block",
+    "foot_wall",
+    "not_finite",
+    "level",
+    "clipped",
+)
+"""Sums over robots and steps, before the reward terms."""
+
+
+class State(NamedTuple):
+    """Everything that changes, one row a robot. It is saved with every checkpoint.
+
+    Attributes:
+        key: random state.
+        body: physics.
+        action: (n, 12) last one.
+        command: (n, 3); command_left: (n,) steps until the next.
+        push_left: (n,) steps until the next push.
+        step: (n,) of the episode, from a random one at first; life: (n,) steps since the start.
+        air_time: (n, 4) [s]; touched: (n, 4) feet on the ground in the last step.
+        way, commanded: (n,) progress along the commands and what they asked for [m].
+        level, column: (n,) tile.
+        friction, added_mass: (n,) of the robot.
+        sums: (m,) of ``MEASURES`` and of the reward terms since they were last read.
+    """
+
+    key: Array
+    body: Body
+    action: Float[Array, "n 12"]
+    command: Float[Array, "n 3"]
+    command_left: Int[Array, " n"]
+    push_left: Int[Array, " n"]
+    step: Int[Array, " n"]
+    life: Int[Array, " n"]
+    air_time: Float[Array, "n 4"]
+    touched: Bool[Array, "n 4"]
+    way: Float[Array, " n"]
+    commanded: Float[Array, " n"]
+    level: Int[Array, " n"]
+    column: Int[Array, " n"]
+    friction: Float[Array, " n"]
+    added_mass: Float[Array, " n"]
+    sums: Float[Array, " m"]
+
+
+class StepResult(NamedTuple):
+    """What a step gives to the learner.
+
+    Attributes:
+        observation: (n, 235) with noise, for the actor; exact: (n, 235) without, for the critic.
+        reward: (n,); done: (n,) 1 where fallen or out of time; timeout: (n,) 1 where out of time.
+    """
+
+    observation: Float[Array, "n 235"]
+    exact: Float[Array, "n 235"]
+    reward: Float[Array, " n"]
+    done: UInt8[Array, " n"]
+    timeout: UInt8[Array, " n"]
+
+
+class LocoEnvironment:
+    """Robots that learn to follow velocity commands.
+
+    Args:
+        config: the training's configuration.
+        seed: of commands, starts, noise, randomisation; defaults to the configuration's.
+
+    Attributes:
+        terrain: the ground with its tiles.
+        state: of all robots; ``step`` replaces it.
+        num_envs: number of robots.
+    """
+
+    def __init__(self, config: LocoConfig, seed: int | None = None) -> None:
+        self.config = config
+        self.num_envs = config.num_envs
+        self.terrain = build_terrain(config.terrain)
+        self.simulation = Simulation(self.terrain.ground, config.kp, config.kd)
+        self.episode_steps = round(config.episode_length / CONTROL_DT)
+        device = jax.devices()[0]
+        self._starts = jax.device_put(jnp.asarray(self.terrain.starts, jnp.float32), device)
+        frame = self.simulation.frame
+        self._edge = np.array([-frame.x0, -frame.y0]) - _EDGE
+        self._weights = {name: getattr(config.rewards, name) for name in self._term_names()}
+        self._step = jax.jit(self._advance, donate_argnums=(1,))
+        self._look = jax.jit(self._observations)
+        key = jax.random.PRNGKey(config.seed if seed is None else seed)
+        self.state: State = jax.device_put(jax.jit(self._first_state)(key), device)
+
+    def _term_names(self) -> list[str]:
+        return [name for name in vars(self.config.rewards) if name not in ("sigma", "clip_at_zero")]
+
+    # ---- what the learner calls -----------------------------------------------------------------------------------
+
+    def observe(self) -> tuple[Float[Array, "n 235"], Float[Array, "n 235"]]:
+        """The observations of the present state, with noise and without."""
+        return self._look(self.simulation.ground, self.state)
+
+    def step(self, action: Float[Array, "n 12"]) -> StepResult:
+        """One control step; robots whose episode ends start anew at once. The old state is given up."""
+        self.state, result = self._step(self.simulation.ground, self.state, action)
+        return result
+
+    def read_measures(self) -> dict[str, float]:
+        """The sums since the last call, as means over robot steps, and set to zero. The only wait for the device."""
+        sums = np.asarray(self.state.sums, dtype=np.float64)
+        self.state = self.state._replace(sums=jax.device_put(jnp.zeros_like(self.state.sums), jax.devices()[0]))
+        names = [*MEASURES, *(f"reward/{name}" for name in self._weights)]
+        raw = dict(zip(names, sums.tolist(), strict=True))
+        steps, metres = max(raw["steps"], 1.0), max(raw["metres"], 1e-6)
+        ends = max(raw["falls"] + raw["timeouts"], 1.0)
+        return {
+            "reward": raw["reward"] / steps / CONTROL_DT,
+            "linear_tracking": raw["linear_tracking"] / steps,
+            "yaw_tracking": raw["yaw_tracking"] / steps,
+            "linear_rmse": math.sqrt(raw["linear_error2"] / steps),
+            "yaw_rmse": math.sqrt(raw["yaw_error2"] / steps),
+            "level": raw["level"] / steps,
+            "falls_per_minute": raw["falls"] / (steps * CONTROL_DT / 60),
+            "speed": raw["metres"] / (steps * CONTROL_DT),
+            "episode_seconds": raw["episode_steps"] / ends * CONTROL_DT,
+            "foot_block_per_m": raw["foot_block"] / metres,
+            "shank_block_per_m": raw["shank_block"] / metres,
+            "foot_wall_per_m": raw["foot_wall"] / metres,
+            "clipped": raw["clipped"] / steps,
+            "not_finite": raw["not_finite"],
+            **{name: value / steps / CONTROL_DT for name, value in raw.items() if name.startswith("reward/")},
+        }
+
+    # ---- starts ---------------------------------------------------------------------------------------------------
+
+    def _start_body(self, level: Array, column: Array, u: Float[Array, "n 22"]) -> Body:
+        """Robots near the middle of their tiles, any heading, joints and velocities a little off."""
+        c, n, s = self.config.randomisation, self.num_envs, 2 * u - 1
+        middle, yaw, zero = self._starts[level, column], s[:, 2] * jnp.pi, jnp.zeros(n)
+        qpos = jnp.concatenate(
+            [
+                middle[:, :2] + s[:, :2] * c.start_xy,
+                middle[:, 2:] + c.start_height,
+                jnp.stack([jnp.cos(yaw / 2), zero, zero, jnp.sin(yaw / 2)], 1),
+                jnp.asarray(DEFAULT_POSE, jnp.float32) * (1 + c.start_joints * s[:, 3:15]),
+            ],
+            1,
+        )
+        qvel = jnp.concatenate([c.start_velocity * s[:, 15:21], jnp.zeros((n, 12))], 1)
+        return Body(qpos, qvel, jnp.zeros((n, 18)))
+
+    def _first_state(self, key: Array) -> State:
+        c, n = self.config, self.num_envs
+        key, draw = jax.random.split(key)
+        u = jax.random.uniform(draw, (n, 40))
+        highest = min(c.curriculum.first_level, c.terrain.levels - 1)
+        level = (u[:, 30] * (highest + 1)).astype(jnp.int32)
+        column = (jnp.arange(n) % c.terrain.columns).astype(jnp.int32)
+        command, left = draw_commands(c.commands, u[:, 22 : 22 + DRAWS])
+        state = State(
+            key=key,
+            body=self._start_body(level, column, u[:, :22]),
+            action=jnp.zeros((n, 12)),
+            command=command,
+            command_left=left,
+            push_left=(u[:, 31] * c.randomisation.push_interval / CONTROL_DT).astype(jnp.int32),
+            step=(u[:, 32] * self.episode_steps).astype(jnp.int32),
+            life=jnp.zeros(n, jnp.int32),
+            air_time=jnp.zeros((n, 4)),
+            touched=jnp.zeros((n, 4), bool),
+            way=jnp.zeros(n),
+            commanded=jnp.zeros(n),
+            level=level,
+            column=column,
+            friction=between(c.randomisation.friction, u[:, 33]),
+            added_mass=between(c.randomisation.added_mass, u[:, 34]),
+            sums=jnp.zeros(len(MEASURES) + len(self._weights)),
+        )
+        return _strong(state)
+
+    # ---- one step -------------------------------------------------------------------------------------------------
+
+    def _observations(self, ground: Ground, state: State) -> tuple[Float[Array, "n 235"], Float[Array, "n 235"]]:
+        """With noise and without. The noise is the state's own, so that a state that is loaded observes the same."""
+        heights = scan_ground(jnp, ground.heights, self.simulation.frame, state.body.qpos)
+        exact = observe(jnp, state.body.qpos, state.body.qvel, state.command, state.action, heights)
+        noise = jax.random.uniform(jax.random.fold_in(state.key, 1), (self.num_envs, OBSERVATION_SIZE))
+        return exact + self.config.randomisation.observation_noise * jnp.asarray(NOISE) * (2 * noise - 1), exact
+
+    def _advance(self, ground: Ground, old: State, action: Float[Array, "n 12"]) -> tuple[State, StepResult]:
+        c, n = self.config, self.num_envs
+        key, draw = jax.random.split(old.key)
+        u = jax.random.uniform(draw, (n, 40))
+        action = jnp.clip(jnp.nan_to_num(action), -CLIP, CLIP)
+        target = jnp.asarray(DEFAULT_POSE, jnp.float32) + ACTION_SCALE * action
+        body, contacts, torque = self.simulation.step(ground, old.body, target, old.friction, old.added_mass)
+
+        # physics that blew up counts as a fall and never reaches the learner
+        sane = jnp.isfinite(body.qpos.sum(1) + body.qvel.sum(1) + body.warmstart.sum(1) + torque.sum(1))
+        broken = ~sane | (jnp.abs(body.qvel).max(1) > _MAX_SPEED)
+        body = Body(*(jnp.where(broken[:, None], last, now) for now, last in zip(body, old.body, strict=True)))
+        torque = jnp.where(broken[:, None], 0.0, torque)
+
+        motion, touching = self._motion(old, body, contacts, torque, action, broken)
+        terms = reward_terms(motion, c.rewards.sigma)
+        weighted = {k: jnp.nan_to_num(terms[k]) * (w * CONTROL_DT) for k, w in self._weights.items()}
+        total = jnp.sum(jnp.stack([value for name, value in weighted.items() if name != "fall"]), 0)
+        clipped = total < 0
+        reward = (jnp.maximum(total, 0.0) if c.rewards.clip_at_zero else total) + weighted["fall"]
+
+        # ends of episodes and levels
+        speed = jnp.linalg.norm(old.command[:, :2], axis=1)
+        along = jnp.sum(motion.linear[:, :2] * old.command[:, :2], 1) / jnp.maximum(speed, 1e-6)
+        way = old.way + jnp.minimum(along, speed) * (speed > 0) * CONTROL_DT
+        commanded = old.commanded + speed * CONTROL_DT
+        step, life = old.step + 1, old.life + 1
+        outside = jnp.any(jnp.abs(body.qpos[:, :2]) > self._edge, 1)
+        timeout = ((step >= self.episode_steps) | outside) & ~motion.fallen
+        done = motion.fallen | timeout
+        level = next_levels(
+            c.curriculum,
+            c.terrain.levels,
+            old.level,
+            timeout,
+            motion.fallen,
+            way,
+            commanded,
+            life / self.episode_steps,
+            u[:, 35],
+        )
+        moved = jnp.linalg.norm(body.qpos[:, :2] - old.body.qpos[:, :2], axis=1)
+        sums = self._measure(motion, old.level, reward, weighted, clipped, moved, timeout, life, broken)
+
+        # pushes, new starts, new commands
+        push = old.push_left <= 0
+        shove = c.randomisation.push_speed * (2 * u[:, 36:38] - 1)
+        body = body._replace(qvel=jnp.where(push[:, None], body.qvel.at[:, :2].set(shove), body.qvel))
+        level = jnp.where(done, level, old.level)
+        fresh = self._start_body(level, old.column, u[:, :22])
+        command, left = draw_commands(c.commands, u[:, 22 : 22 + DRAWS])
+        renew = done | (old.command_left <= 0)
+
+        def ended(start: Array, going: Array) -> Array:
+            return jnp.where(done.reshape((n,) + (1,) * (going.ndim - 1)), start, going)
+
+        state = State(
+            key=key,
+            body=Body(*(ended(start, going) for start, going in zip(fresh, body, strict=True))),
+            action=ended(jnp.zeros_like(action), action),
+            command=jnp.where(renew[:, None], command, old.command),
+            command_left=jnp.where(renew, left, old.command_left - 1),
+            push_left=jnp.where(push, round(c.randomisation.push_interval / CONTROL_DT), old.push_left - 1),
+            step=jnp.where(done, 0, step),
+            life=jnp.where(done, 0, life),
+            air_time=ended(jnp.zeros((n, 4)), motion.air_time * ~touching),
+            touched=ended(jnp.zeros((n, 4), bool), contacts.foot),
+            way=jnp.where(done, 0.0, way),
+            commanded=jnp.where(done, 0.0, commanded),
+            level=level,
+            column=old.column,
+            friction=old.friction,
+            added_mass=old.added_mass,
+            sums=old.sums + sums,
+        )
+        state = _strong(state)
+        noisy, exact = self._observations(ground, state)
+        return state, StepResult(noisy, exact, reward, done.astype(jnp.uint8), timeout.astype(jnp.uint8))
+
+    def _motion(
+        self, old: State, body: Body, contacts: Contacts, torque: Array, action: Array, broken: Array
+    ) -> tuple[Motion, Bool[Array, "n 4"]]:
+        """What the rewards look at, and which feet count as on the ground (now or a step ago [legged_gym])."""
+        quaternion = body.qpos[:, 3:7]
+        down = jnp.broadcast_to(jnp.array([0.0, 0.0, -1.0]), (self.num_envs, 3))
+        gravity = rotate_inverse(jnp, quaternion, down)
+        touching = contacts.foot | old.touched
+        motion = Motion(
+            linear=rotate_inverse(jnp, quaternion, body.qvel[:, :3]),
+            angular=body.qvel[:, 3:6],
+            gravity=gravity,
+            joints=body.qpos[:, 7:],
+            joint_speed=body.qvel[:, 6:],
+            last_joint_speed=old.body.qvel[:, 6:],
+            torque=torque,
+            action=action,
+            last_action=old.action,
+            command=old.command,
+            contacts=contacts,
+            air_time=old.air_time + CONTROL_DT,
+            landed=(old.air_time > 0) & touching,
+            fallen=contacts.trunk_down | (gravity[:, 2] > _UPSIDE) | broken,
+        )
+        return motion, touching
+
+    def _measure(
+        self, m: Motion, level: Array, reward: Array, weighted: dict[str, Array], clipped: Array, moved: Array,
+        timeout: Array, life: Array, broken: Array,
+    ) -> Float[Array, " m"]:  # fmt: skip
+        """Sums over robots in the order of ``MEASURES``, then the weighted reward terms."""
+        linear2 = jnp.sum((m.command[:, :2] - m.linear[:, :2]) ** 2, 1)
+        yaw2 = (m.command[:, 2] - m.angular[:, 2]) ** 2
+        values = {
+            "steps": jnp.ones(self.num_envs),
+            "reward": reward,
+            "linear_tracking": jnp.exp(-linear2 / self.config.rewards.sigma),
+            "yaw_tracking": jnp.exp(-yaw2 / self.config.rewards.sigma),
+            "linear_error2": linear2,
+            "yaw_error2": yaw2,
+            "metres": moved * ~broken,
+            "falls": m.fallen,
+            "timeouts": timeout,
+            "episode_steps": life * (m.fallen | timeout),
+            "foot_block": m.contacts.foot_block.any(1),
+            "shank_block": m.contacts.shank_block.any(1),
+            "foot_wall": m.contacts.foot_wall.any(1),
+            "not_finite": broken,
+            "level": level,
+            "clipped": clipped,
+        }
+        ordered = [values[name] for name in MEASURES] + [weighted[name] for name in self._weights]
+        return jnp.stack([jnp.sum(jnp.nan_to_num(value), dtype=jnp.float32) for value in ordered])
+
+
+def _strong(state: State) -> State:
+    """No weak types: with them the step would compile twice."""
+    return jax.tree.map(lambda x: x.astype(x.dtype), state)

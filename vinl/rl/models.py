@@ -1,0 +1,45 @@
+"""Networks for rsl-rl."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from rsl_rl.models import MLPModel
+from tensordict import TensorDict
+from torch import nn
+
+from vinl.policies.networks import MapActor, mlp
+from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE
+
+
+class MapModel(MLPModel):
+    """rsl-rl actor that turns the height scan into a short code before the MLP [paper III-A].
+
+    Args:
+        encoder: widths of the encoder's hidden layers.
+        code: size of the map code.
+        rest: as for ``MLPModel``.
+    """
+
+    def __init__(self, *args: Any, encoder: Sequence[int] = (128, 64), code: int = 32, **rest: Any) -> None:
+        self._encoder_sizes, self._code_size = (SCAN_SIZE, *encoder, code), code
+        super().__init__(*args, **rest)
+        self.encoder = mlp(self._encoder_sizes, nn.ReLU)
+
+    def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> torch.Tensor:
+        """Proprioception and map code, (n, 48 + code)."""
+        full = super().get_latent(obs, masks, hidden_state)
+        return torch.cat([full[..., :PROPRIOCEPTION_SIZE], self.encoder(full[..., PROPRIOCEPTION_SIZE:])], -1)
+
+    def _get_latent_dim(self) -> int:
+        return PROPRIOCEPTION_SIZE + self._code_size
+
+    def export(self) -> MapActor:
+        """The deterministic actor with the same weights, as policies are shipped."""
+        widths = [layer.out_features for layer in self.mlp if isinstance(layer, nn.Linear)]
+        actor = MapActor(encoder=self._encoder_sizes[1:-1], code=self._code_size, actor=widths[:-1], actions=widths[-1])
+        weights = {k: v for k, v in self.state_dict().items() if k.startswith(("encoder.", "mlp."))}
+        actor.load_state_dict({k.replace("mlp.", "actor.", 1): v for k, v in weights.items()})
+        return actor

@@ -1,0 +1,119 @@
+"""A training run on disk: configuration, curves, checkpoints. Everything in it survives a kill at any moment."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+from pathlib import Path
+from typing import Any
+
+import torch
+import yaml
+
+from vinl.config.errors import InputError
+
+CONFIG = "config.yaml"
+METRICS = "metrics.jsonl"
+CHECKPOINT = "checkpoint.pt"
+
+
+class RunFolder:
+    """The files of one run.
+
+    Args:
+        path: the folder.
+
+    Raises:
+        InputError: from ``create`` and ``open``, see there.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+
+    @property
+    def policy(self) -> Path:
+        """Where the policy is exported to."""
+        return self.path / "policy"
+
+    def create(self, config: dict[str, Any]) -> None:
+        """A new run.
+
+        Raises:
+            InputError: the folder holds a run already, or is a file.
+        """
+        if self.path.exists() and not self.path.is_dir():
+            raise InputError(f"{self.path} is a file; choose a folder for the run with --out")
+        if (self.path / CONFIG).exists():
+            raise InputError(f"{self.path} holds a run already; continue it with --resume, or choose another --out")
+        self.path.mkdir(parents=True, exist_ok=True)
+        write_text(self.path / CONFIG, yaml.safe_dump(config, sort_keys=False))
+
+    def open(self) -> dict[str, Any]:
+        """The configuration of a run that exists.
+
+        Raises:
+            InputError: there is no run in the folder, or its configuration is broken.
+        """
+        file = self.path / CONFIG
+        if not file.is_file():
+            raise InputError(f"{self.path} holds no training run ({CONFIG} is missing)")
+        try:
+            config = yaml.safe_load(file.read_text(encoding="utf-8"))
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise InputError(f"{file} is broken: {' '.join(str(error).split())}") from None
+        if not isinstance(config, dict):
+            raise InputError(f"{file} is broken: it holds no settings")
+        return config
+
+    def save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
+        """Replace the checkpoint, whole or not at all."""
+        scratch = self.path / (CHECKPOINT + ".new")
+        with scratch.open("wb") as file:
+            torch.save(checkpoint, file)
+            file.flush()
+            os.fsync(file.fileno())
+        scratch.replace(self.path / CHECKPOINT)
+
+    def load_checkpoint(self) -> dict[str, Any] | None:
+        """The newest checkpoint on the CPU, or None when the run was stopped before its first.
+
+        Raises:
+            InputError: the checkpoint is broken.
+        """
+        file = self.path / CHECKPOINT
+        if not file.exists():
+            return None
+        try:
+            return torch.load(file, map_location="cpu", weights_only=True)
+        except (RuntimeError, OSError, EOFError, pickle.UnpicklingError, ValueError) as error:
+            first = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise InputError(f"{file} is broken ({first}); remove it to start the run anew") from None
+
+    def append_metrics(self, row: dict[str, float]) -> None:
+        """Add a line to the curves."""
+        with (self.path / METRICS).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+
+    def cut_metrics(self, iteration: int) -> None:
+        """Drop the lines beyond a checkpoint's iteration, and one that was cut off by a kill."""
+        file = self.path / METRICS
+        if not file.exists():
+            return
+        kept = []
+        for line in file.read_text(encoding="utf-8").splitlines():
+            try:
+                row = json.loads(line)
+            except json.JSONDecodeError:
+                break
+            if row["iteration"] > iteration:
+                break
+            kept.append(line + "\n")
+        write_text(file, "".join(kept))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all."""
+    scratch = path.with_name(path.name + ".new")
+    scratch.write_text(text, encoding="utf-8")
+    scratch.replace(path)
