@@ -30,8 +30,16 @@ def load_config(cls: type[T], name_or_path: str | Path, overrides: Sequence[str]
     Raises:
         InputError: missing or broken file, unknown key, wrong type, or a value that the dataclass refuses.
     """
-    path = find_config(name_or_path)
-    return build_config(cls, _read(path, ()), overrides, source=str(path))
+    return build_config(cls, read_config(name_or_path), overrides, source=str(find_config(name_or_path)))
+
+
+def read_config(name_or_path: str | Path) -> dict[str, Any]:
+    """What a config file and those that it extends say together, as plain data, not yet checked against a dataclass.
+
+    Raises:
+        InputError: missing or broken file.
+    """
+    return _read(find_config(name_or_path), ())
 
 
 def build_config(cls: type[T], data: Mapping[str, Any], overrides: Sequence[str] = (), source: str = "config") -> T:
