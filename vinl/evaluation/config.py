@@ -1,0 +1,81 @@
+"""The rules of an evaluation: limits of an episode, what counts as an end, how the oracle walks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from vinl.config.errors import InputError
+
+
+@dataclass(frozen=True)
+class OracleConfig:
+    """How the shortest-path follower walks.
+
+    Attributes:
+        speed: forward speed on a straight way [m/s].
+        look_ahead: distance along the way to the point that the robot heads for [m].
+        turn_gain: yaw rate for each radian of heading error [1/s].
+        turn_rate: largest yaw rate [rad/s] [paper: 60 deg/s].
+        turn_in_place: heading error beyond which it stops and turns [rad].
+        replan_m: distance from the planned way beyond which a new one is planned [m].
+    """
+
+    speed: float = 0.8
+    look_ahead: float = 0.6
+    turn_gain: float = 1.5
+    turn_rate: float = math.pi / 3
+    turn_in_place: float = 0.9
+    replan_m: float = 0.6
+
+    def __post_init__(self) -> None:
+        if not 0 < self.speed <= 1:
+            raise InputError(f"oracle.speed must lie in (0, 1] m/s, got {self.speed}")
+        for name in ("look_ahead", "turn_gain", "turn_rate", "turn_in_place", "replan_m"):
+            if not getattr(self, name) > 0:
+                raise InputError(f"oracle.{name} must be positive, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True)
+class EvaluationConfig:
+    """The rules of the paper's protocol [paper, IV; facts/locomotion 6], and ours where it names none.
+
+    Attributes:
+        time_limit: length of an episode [s] [paper code: 250 decisions at 2 Hz].
+        success_radius: an episode succeeds when the robot's middle is nearer to the goal than this [m] [paper].
+        navigation_period: control steps of 0.02 s between two decisions of the navigator [paper: 2 Hz].
+        min_distance: least straight distance from start to goal [m] [paper code].
+        clearance: least distance of start and goal to walls and furniture [m] [paper code].
+        joint_noise: half-width of the uniform noise on the joint angles at the start [rad].
+        max_tilt: a trunk tilted farther than this has fallen [rad].
+        stuck_window: a time-out counts as ``stuck`` if over so many last seconds [s] ...
+        stuck_distance: ... the robot ended nearer than this to where it was [m].
+        min_metres: episodes shorter than this do not count in the rates per metre [m] [paper: 1 m].
+        oracle: how the shortest-path follower walks.
+    """
+
+    time_limit: float = 125.0
+    success_radius: float = 0.325
+    navigation_period: int = 25
+    min_distance: float = 5.0
+    clearance: float = 0.5
+    joint_noise: float = 0.05
+    max_tilt: float = math.radians(72)
+    stuck_window: float = 20.0
+    stuck_distance: float = 0.5
+    min_metres: float = 1.0
+    oracle: OracleConfig = field(default_factory=OracleConfig)
+
+    def __post_init__(self) -> None:
+        if not 0.02 <= self.time_limit <= 3600:
+            raise InputError(f"time_limit must lie between 0.02 and 3600 s, got {self.time_limit}")
+        if self.navigation_period < 1:
+            raise InputError(f"navigation_period must be at least 1 control step, got {self.navigation_period}")
+        if not 0 < self.max_tilt <= math.pi:
+            raise InputError(f"max_tilt must lie in (0, pi] rad, got {self.max_tilt}")
+        for name in ("success_radius", "stuck_window", "min_metres"):
+            if not getattr(self, name) > 0:
+                raise InputError(f"{name} must be positive, got {getattr(self, name)}")
+        for name in ("min_distance", "clearance", "joint_noise", "stuck_distance"):
+            if not getattr(self, name) >= 0:
+                raise InputError(f"{name} must not be negative, got {getattr(self, name)}")

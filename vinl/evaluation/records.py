@@ -1,0 +1,137 @@
+"""What an evaluation returns: one record an episode, its trace for the drawings, and the whole."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from vinl.world.floorplan import FloorPlan
+
+SUCCESS, FALL, TIMEOUT, STUCK = "success", "fall", "timeout", "stuck"
+END_REASONS = (SUCCESS, FALL, TIMEOUT, STUCK)
+"""How an episode ends. ``stuck`` is a time-out of a robot that no longer got anywhere."""
+
+
+@dataclass(frozen=True)
+class EpisodeRecord:
+    """One episode, as it stands in ``results.json``. ``*_steps`` count control steps of 0.02 s.
+
+    Attributes:
+        plan: floor plan.
+        episode: number of the start/goal pair.
+        seed: repetition.
+        start, goal: x, y [m].
+        yaw: heading at the start [rad].
+        straight_m, geodesic_m: straight and shortest distance from start to goal [m].
+        blocks: how many blocks lay in the plan.
+        success: came within the success radius.
+        end_reason: one of ``END_REASONS``.
+        fell: ended in a fall.
+        time_s: length [s].
+        distance_m: way of the trunk, summed at 50 Hz [m].
+        spl: success x shortest / max(shortest, walked).
+        soft_spl: share of the shortest distance that was covered, x the same ratio.
+        foot_steps: at least one foot on a block or a wall.
+        foot_block_steps, foot_wall_steps: the same for blocks and for walls with furniture.
+        leg_contact_steps: a hip, thigh or shank on a block or a wall.
+        trunk_contact_steps: the trunk on a block or a wall.
+        paper_foot_steps: the paper's own rule, from foot height and force [facts/locomotion 2].
+        speed_rmse: root mean square of the error of the horizontal velocity [m/s].
+        yaw_rate_rmse: the same of the yaw rate [rad/s].
+        note: why start and goal are nearer than asked for, if they are.
+    """
+
+    plan: str
+    episode: int
+    seed: int
+    start: tuple[float, float]
+    goal: tuple[float, float]
+    yaw: float
+    straight_m: float
+    geodesic_m: float
+    blocks: int
+    success: bool
+    end_reason: str
+    fell: bool
+    time_s: float
+    distance_m: float
+    spl: float
+    soft_spl: float
+    foot_steps: int
+    foot_block_steps: int
+    foot_wall_steps: int
+    leg_contact_steps: int
+    trunk_contact_steps: int
+    paper_foot_steps: int
+    speed_rmse: float
+    yaw_rate_rmse: float
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeTrace:
+    """What drawings and videos need of an episode.
+
+    Attributes:
+        path: (k, 2) the trunk every 0.1 s [m].
+        contacts: (m, 4) time [s], index into ``contact.KINDS``, x, y [m]; one row a control step and kind.
+        blocks: (b, 6) rows of ``Blocks``.
+        poses: (f, 19) qpos every 0.04 s, of episodes that a video was asked for; otherwise (0, 19).
+        commands: (f, 3) command at those times.
+    """
+
+    path: Float[np.ndarray, "k 2"]
+    contacts: Float[np.ndarray, "m 4"]
+    blocks: Float[np.ndarray, "b 6"]
+    poses: Float[np.ndarray, "f 19"]
+    commands: Float[np.ndarray, "f 3"]
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """Record and trace."""
+
+    record: EpisodeRecord
+    trace: EpisodeTrace
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """A whole evaluation.
+
+    Attributes:
+        episodes: ordered by plan, seed, episode.
+        aggregate: the figures, see ``metrics.aggregate_episodes``.
+        plans: the floor plans, for the drawings.
+        policies: card digests of the locomotor and the navigator's name.
+        config: everything that the run depends on.
+        wall_seconds: how long it took [s].
+        videos: files that were written.
+    """
+
+    episodes: list[Episode]
+    aggregate: dict[str, Any]
+    plans: list[FloorPlan]
+    policies: dict[str, Any]
+    config: dict[str, Any]
+    wall_seconds: float
+    videos: list[str] = field(default_factory=list)
+
+    @property
+    def records(self) -> list[EpisodeRecord]:
+        """The records alone."""
+        return [episode.record for episode in self.episodes]
+
+
+def plain_record(record: EpisodeRecord) -> dict[str, Any]:
+    """A record as plain data, lengths rounded to 0.1 mm and rates to six digits."""
+    return {key: _rounded(value) for key, value in asdict(record).items()}
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, (tuple, list)):
+        return [_rounded(v) for v in value]
+    return round(value, 6) if isinstance(value, float) else value

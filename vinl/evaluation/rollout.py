@@ -1,0 +1,136 @@
+"""The chained roll-out: the navigator at 2 Hz, the locomotor at 50 Hz, physics at 200 Hz in MuJoCo C."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from vinl.evaluation.config import EvaluationConfig
+from vinl.evaluation.episodes import EpisodeSetup
+from vinl.evaluation.ground_scan import GroundScan
+from vinl.evaluation.navigator import Navigator, Task
+from vinl.evaluation.records import Episode
+from vinl.evaluation.scene import build_scene
+from vinl.evaluation.tally import Tally
+from vinl.evaluation.walker import Walker, joint_targets
+from vinl.policies.policy import Policy
+from vinl.robot.aliengo import CONTROL_DT
+from vinl.robot.observation import observe
+from vinl.robot.rotation import yaw_of
+from vinl.world.blocks import Blocks
+from vinl.world.floorplan import FloorPlan
+from vinl.world.free_space import FreeSpace
+
+
+class Interrupted(Exception):
+    """The roll-out was asked to stop."""
+
+
+def goal_in_heading_frame(
+    pose: Float[np.ndarray, "n 3"], goal: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, "n 3"]:
+    """Straight distance to the goal [m], cosine and sine of its bearing, left positive [facts/locomotion 6.5]."""
+    to = goal - pose[:, :2]
+    bearing = np.arctan2(to[:, 1], to[:, 0]) - pose[:, 2]
+    return np.stack([np.linalg.norm(to, axis=1), np.cos(bearing), np.sin(bearing)], 1)
+
+
+def run_episodes(
+    plan: FloorPlan,
+    setups: Sequence[EpisodeSetup],
+    locomotor: Policy,
+    navigator: Navigator,
+    config: EvaluationConfig,
+    filmed: Collection[int] = (),
+    on_end: Callable[[int], None] = lambda _: None,
+    is_stopped: Callable[[], bool] = lambda: False,
+) -> list[Episode]:
+    """Run episodes of one plan in lockstep.
+
+    Both policies are always asked for all rows, those of finished episodes too, so that the answer to one row never
+    depends on which others are still under way: the result of a unit is the same in any process.
+
+    Args:
+        plan: the floor plan.
+        setups: the episodes.
+        locomotor: observations (n, 235) to actions (n, 12).
+        navigator: see ``Navigator``.
+        config: limits of an episode.
+        filmed: rows whose poses are kept.
+        on_end: called with the row of an episode that ended.
+        is_stopped: asked before each decision of the navigator.
+
+    Raises:
+        Interrupted: ``is_stopped`` said so.
+    """
+    n, space = len(setups), FreeSpace(plan)
+    locomotor.reset(n)
+    navigator.reset([Task(space, setup.route) for setup in setups])
+    walkers = _spawn_walkers(plan, setups, locomotor)
+    scan = GroundScan(plan, [setup.blocks for setup in setups])
+    goals = np.stack([setup.route.goal for setup in setups])
+    tallies = [Tally(setup, space, config, film=k in filmed) for k, setup in enumerate(setups)]
+    command, choice, actions = np.zeros((n, 3)), np.zeros((n, 2)), np.zeros((n, 12), np.float32)
+    alive = list(range(n))
+    qpos, qvel = np.stack([w.qpos for w in walkers]), np.stack([w.qvel for w in walkers])
+    limit = round(config.time_limit / CONTROL_DT)
+    for step in range(limit):
+        if step % config.navigation_period == 0:
+            if is_stopped():
+                raise Interrupted
+            pose = np.column_stack([qpos[:, :2], yaw_of(np, qpos[:, 3:7])])
+            choice = navigator.act(
+                {"goal": goal_in_heading_frame(pose, goals), "previous_action": choice, "pose": pose}
+            )
+            command[:, 0], command[:, 2] = choice[:, 0], choice[:, 1]
+        for k in alive:
+            tallies[k].note_pose(step, qpos[k], command[k])
+        actions = locomotor.act(observe(np, qpos, qvel, command, actions, scan.read(qpos)))
+        targets = joint_targets(actions, locomotor.card)
+        for k in alive:
+            walkers[k].step(targets[k])
+            qpos[k], qvel[k] = walkers[k].qpos, walkers[k].qvel
+        errors = _tracking_errors(qpos, qvel, command)
+        away = np.linalg.norm(qpos[:, :2] - goals, axis=1)
+        for k in list(alive):
+            tallies[k].count(step + 1, walkers[k], errors[k])
+            if away[k] < config.success_radius:
+                tallies[k].end("success")
+            elif walkers[k].has_fallen(config.max_tilt):
+                tallies[k].end("fall")
+            elif step + 1 == limit:
+                tallies[k].end_of_time()
+            else:
+                continue
+            alive.remove(k)
+            on_end(k)
+        if not alive:
+            break
+    return [tally.close() for tally in tallies]
+
+
+def _spawn_walkers(plan: FloorPlan, setups: Sequence[EpisodeSetup], locomotor: Policy) -> list[Walker]:
+    gains = {key: float(locomotor.card.action[key]) for key in ("kp", "kd") if key in locomotor.card.action}
+    walkers, bare = [], None
+    for setup in setups:
+        if len(setup.blocks):
+            model = build_scene(plan.boxes, setup.blocks.boxes(), **gains)
+        else:
+            model = bare = bare or build_scene(plan.boxes, Blocks.empty().boxes(), **gains)
+        walker = Walker(model)
+        walker.spawn(*setup.route.start.tolist(), setup.yaw, setup.joints)
+        walkers.append(walker)
+    return walkers
+
+
+def _tracking_errors(
+    qpos: Float[np.ndarray, "n 19"], qvel: Float[np.ndarray, "n 18"], command: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "n 2"]:
+    """Squared errors of the horizontal velocity in the heading frame [m2/s2] and of the yaw rate [rad2/s2]."""
+    yaw = yaw_of(np, qpos[:, 3:7])
+    c, s = np.cos(yaw), np.sin(yaw)
+    ahead, left = c * qvel[:, 0] + s * qvel[:, 1], -s * qvel[:, 0] + c * qvel[:, 1]
+    linear = (ahead - command[:, 0]) ** 2 + (left - command[:, 1]) ** 2
+    return np.stack([linear, (qvel[:, 5] - command[:, 2]) ** 2], 1)

@@ -1,0 +1,59 @@
+"""One robot in its own MuJoCo data: spawn it, drive it for one action, keep the tally of its episode."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from vinl.evaluation.contact import ContactReader
+from vinl.policies.card import PolicyCard
+from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, STANDING_HEIGHT, SUBSTEPS, home_qpos
+
+ACTION_LIMIT = 100.0
+"""Actions are held to +- this [ViNL config]."""
+
+
+class Walker:
+    """A robot and what it touches. ``qpos`` and ``qvel`` are views of its state."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.model, self.data = model, mujoco.MjData(model)
+        self.contacts = ContactReader(model, self.data)
+        self.qpos: np.ndarray = self.data.qpos
+        self.qvel: np.ndarray = self.data.qvel
+        self._ctrl: np.ndarray = self.data.ctrl
+        self._time = 0.0
+
+    def spawn(self, x: float, y: float, yaw: float, joints: Float[np.ndarray, "12"], ground: float = 0.0) -> None:
+        """Stand at rest at x, y [m] on ground of a height [m], with a heading and joint angles [rad]."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.qpos[:] = home_qpos(x, y, ground + STANDING_HEIGHT, yaw)
+        self.qpos[7:] = joints
+        mujoco.mj_forward(self.model, self.data)
+        self._time = 0.0
+
+    def step(self, target: Float[np.ndarray, "12"]) -> None:
+        """Drive to joint targets [rad] for one control step, and latch the contacts of its physics steps."""
+        self._ctrl[:] = target
+        self.contacts.clear()
+        for _ in range(SUBSTEPS):
+            mujoco.mj_step(self.model, self.data)
+            self.contacts.look()
+        self._time += CONTROL_DT
+
+    def has_fallen(self, max_tilt: float) -> bool:
+        """Whether the trunk is tilted farther than ``max_tilt`` [rad] or lies on the ground, or physics broke down
+        (MuJoCo then starts the robot's time anew)."""
+        upright = 1 - 2 * (self.qpos[4] ** 2 + self.qpos[5] ** 2)
+        broken = abs(self.data.time - self._time) > CONTROL_DT / 2
+        return bool(self.contacts.trunk_on_ground or broken or upright < math.cos(max_tilt))
+
+
+def joint_targets(actions: Float[np.ndarray, "n 12"], card: PolicyCard) -> Float[np.ndarray, "n 12"]:
+    """Actions of a policy as joint targets [rad]."""
+    pose = np.asarray(card.action.get("default_pose", DEFAULT_POSE), dtype=np.float64)
+    held = np.clip(actions.astype(np.float64), -ACTION_LIMIT, ACTION_LIMIT)
+    return pose + float(card.action["scale"]) * held
