@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FLOOR, WALL, FURNITURE, EDGE, PANE, BLOCK = "#f6f1e7", "#2f3437", "#d3c1a5", "#9c8767", "#8fc1dd", "#c8553d"
-START, GOAL, PATH = "#2a7f62", "#c8553d", "#1f5fa8"
+FLOOR, WALL, FURNITURE, EDGE, PANE, DOOR = "#f6f1e7", "#2f3437", "#d3c1a5", "#9c8767", "#8fc1dd", "#b07a4a"
+START, GOAL, PATH, BLOCK = "#2a7f62", "#c8553d", "#1f5fa8", "#c8553d"
 
 
 def draw_floorplan(
@@ -74,7 +74,9 @@ def draw_floorplan(
     high = plan.walls.rows[:, 5] >= BODY_HEIGHT
     add(Boxes(plan.furniture.rows), FURNITURE, EDGE, 0.7, 2)
     add(Boxes(plan.walls.rows[~high]), WALL, WALL, 0.3, 3)
-    add(plan.windows, PANE, "white", 0.6, 4)
+    shut = plan.windows.rows[:, 5] == 0.0
+    add(Boxes(plan.windows.rows[~shut]), PANE, "white", 0.6, 4)
+    add(Boxes(plan.windows.rows[shut]), DOOR, "white", 0.6, 4)
     if blocks is not None:
         add(blocks.boxes(), BLOCK, "white", 0.4, 5)
     for path in paths:
@@ -118,7 +120,7 @@ def save_floorplan(plan: FloorPlan, out: str | Path, dpi: int = 100, **drawn) ->
 
 
 def _add_scale_bar(axes: Axes, extent: tuple[float, float, float, float]) -> None:
-    """Two metres, lower left."""
-    left, low = extent[0] + 0.1, extent[2] + 0.15
+    """Two metres, lower left, in the strip of outside that every grid keeps."""
+    left, low = extent[0] + 0.1, extent[2] + 0.08
     axes.plot([left, left + 2], [low, low], color=WALL, linewidth=2, zorder=9)
-    axes.text(left + 1, low + 0.06, "2 m", ha="center", va="bottom", fontsize=7, color=WALL, zorder=9)
+    axes.text(left + 2.1, low, "2 m", ha="left", va="center", fontsize=7, color=WALL, zorder=9)

@@ -58,7 +58,8 @@ class FloorPlan:
         inside: shape (rows, columns), the floor of the building; cells under walls and furniture may be either.
         free: shape (rows, columns), floor inside that nothing below ``BODY_HEIGHT`` covers.
         frame: where the cells of both grids lie.
-        windows: where the walls have panes; only drawn, since a pane stops robot and depth camera like the wall does.
+        windows: panes, and front doors (those from the floor on, bottom 0); only drawn, since a pane or a shut door
+            stops robot and depth camera like the wall does.
         labels: room names; only drawn.
     """
 
