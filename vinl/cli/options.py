@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import re
 from typing import TypeVar
 
 import tyro
@@ -12,7 +11,7 @@ import tyro
 from vinl.config.errors import InputError
 
 T = TypeVar("T")
-_RULE = re.compile(r"^[\s│|]*[─\-]{5,}[\s│|]*$")
+_FRAME = " │╰╯─"
 
 
 def parse_options(options: type[T], argv: list[str], command: str) -> T:
@@ -37,11 +36,13 @@ def parse_options(options: type[T], argv: list[str], command: str) -> T:
 
 
 def _essence(box: str) -> str:
-    """The first statement in tyro's box, and the option that it supposes was meant."""
-    lines = [line.strip(" │|") for line in box.splitlines() if not line.strip().startswith(("╭", "╰", "+"))]
-    rules = [k for k, line in enumerate(lines) if _RULE.match(line)]
-    first = " ".join(line for line in lines[: rules[0] if rules else None] if line)
+    """The first statement in tyro's box, under its title, and the option that it supposes was meant."""
+    lines = [line.strip(_FRAME) for line in box.splitlines()[1:]]
+    lines = [line if line.strip("-") else "" for line in lines]  # a rule, drawn or of dashes, becomes an empty line
+    while lines and not lines[0]:
+        lines.pop(0)
+    first = " ".join(lines[: lines.index("")] if "" in lines else lines)
     for k, line in enumerate(lines[:-1]):
         if line.startswith(("Perhaps you meant", "Did you mean")):
-            return f"{first}, did you mean {lines[k + 1].split(',')[-1].split()[0]}?"
+            return f"{first}, did you mean {lines[k + 1].split(',')[0].split()[0]}?"
     return first
