@@ -1,0 +1,187 @@
+"""A renderer for videos and the pictures in the docs: shaded rays by Warp on the CPU, no OpenGL anywhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from jaxtyping import Float, UInt8
+
+from vinl.sensing.depth import build_mesh
+from vinl.sensing.kernels import cast_rays
+from vinl.sensing.picture_kernels import render_picture
+from vinl.sensing.robot_shape import BodyMesh
+from vinl.sensing.scene import Scene
+
+_CREASE = math.radians(35)
+_FAR = 80.0
+_SUN = np.array([0.35, -0.45, 0.82])
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Where a camera is.
+
+    Attributes:
+        position: (3,) in the world [m].
+        rotation: (3, 3), camera to world: columns are forward, left and up.
+    """
+
+    position: Float[np.ndarray, " 3"]
+    rotation: Float[np.ndarray, "3 3"]
+
+
+def look_at(eye: Sequence[float] | np.ndarray, target: Sequence[float] | np.ndarray) -> View:
+    """A camera at ``eye`` [m] that looks at ``target`` [m], the horizon level."""
+    position = np.asarray(eye, dtype=np.float64)
+    forward = np.asarray(target, dtype=np.float64) - position
+    forward /= np.linalg.norm(forward)
+    left = np.cross([0.0, 0.0, 1.0], forward)
+    left = np.array([0.0, 1.0, 0.0]) if np.linalg.norm(left) < 1e-6 else left / np.linalg.norm(left)
+    return View(position, np.stack([forward, left, np.cross(forward, left)], -1))
+
+
+class RayRenderer:
+    """Pictures of a world that does not move and of a robot that does.
+
+    Args:
+        scene: the world.
+        bodies: the robot's meshes, see ``RobotShape.bodies``; none for a picture of the world alone.
+        names: the order in which ``render`` gets the bodies' frames; the order of first use by default.
+    """
+
+    def __init__(self, scene: Scene, bodies: Sequence[BodyMesh] = (), names: Sequence[str] | None = None) -> None:
+        self.names = tuple(dict.fromkeys(body.body for body in bodies)) if names is None else tuple(names)
+        self._world = build_mesh(scene.vertices, scene.faces, "cpu")
+        self._colours = wp.array(scene.colours, dtype=wp.vec3, device="cpu")
+        self._checker = wp.array(scene.checker, dtype=float, device="cpu")
+        self._meshes = [build_mesh(body.vertices, body.faces, "cpu") for body in bodies]
+        centres = [(body.vertices.min(0) + body.vertices.max(0)) / 2 for body in bodies]
+        radii = [np.linalg.norm(b.vertices - c, axis=1).max() for b, c in zip(bodies, centres, strict=True)]
+        first = np.cumsum([0, *[len(body.faces) for body in bodies]])[:-1]
+        normals = [_corner_normals(body.vertices, body.faces) for body in bodies] or [np.zeros((1, 3))]
+        self._frame_of = np.array([self.names.index(body.body) for body in bodies], dtype=np.int64)
+        self._centres, self._radii = np.array(centres).reshape(-1, 3), np.array(radii)
+        self._body_inputs = [
+            wp.array([mesh.id for mesh in self._meshes], dtype=wp.uint64, device="cpu"),
+            wp.array(self._frame_of, dtype=int, device="cpu"),
+            wp.array(np.array([body.colour for body in bodies]).reshape(-1, 3), dtype=wp.vec3, device="cpu"),
+            wp.array(self._centres, dtype=wp.vec3, device="cpu"),
+            wp.array(self._radii, dtype=float, device="cpu"),
+            wp.array(first, dtype=int, device="cpu"),
+            wp.array(np.concatenate(normals), dtype=wp.vec3, device="cpu"),
+        ]
+
+    def render(
+        self,
+        view: View,
+        width: int,
+        height: int,
+        positions: Float[np.ndarray, "b 3"] | None = None,
+        rotations: Float[np.ndarray, "b 3 3"] | None = None,
+        hfov: float = math.radians(60),
+        shadows: int = 1,
+        samples: int = 1,
+    ) -> UInt8[np.ndarray, "height width 3"]:
+        """One picture.
+
+        Args:
+            view: where the camera is.
+            width, height: size of the picture [pixels].
+            positions: (b, 3) of the bodies in the world [m], in the order of ``names``, see ``RobotShape.place``.
+            rotations: (b, 3, 3), body to world. Without positions and rotations the robot is not there.
+            hfov: horizontal field of view [rad].
+            shadows: 0 none, 1 the robot's (fast), 2 everything's.
+            samples: rays along each side of a pixel; 2 smooths the edges at four times the cost.
+
+        Returns:
+            (height, width, 3) red, green, blue.
+
+        Raises:
+            ValueError: if the frames do not fit ``names``.
+        """
+        body_inputs = self._body_inputs
+        if positions is None or rotations is None:
+            positions, rotations = np.zeros((0, 3)), np.zeros((0, 3, 3))
+            body_inputs = [wp.empty(0, dtype=array.dtype, device="cpu") for array in body_inputs]
+            centre, radius = np.zeros(3), 0.0
+        elif len(positions) != len(self.names) or len(rotations) != len(self.names):
+            raise ValueError(f"{len(self.names)} bodies, but {len(positions)} positions, {len(rotations)} rotations")
+        else:
+            centre, radius = self._enclose(positions, rotations)
+        picture = np.empty((height, width, 3), np.uint8)
+        tan = math.tan(hfov / 2)
+        wp.launch(
+            render_picture,
+            dim=(height, width),
+            inputs=[
+                self._world.id,
+                self._colours,
+                self._checker,
+                *body_inputs,
+                wp.array(np.ascontiguousarray(positions, np.float32), dtype=wp.vec3, device="cpu"),
+                wp.array(np.ascontiguousarray(rotations, np.float32), dtype=wp.mat33, device="cpu"),
+                wp.vec3(*centre),
+                radius,
+                wp.vec3(*view.position),
+                wp.mat33(*view.rotation.ravel()),
+                wp.vec2(tan, tan * height / width),
+                wp.vec3(*(_SUN / np.linalg.norm(_SUN))),
+                _FAR,
+                shadows,
+                samples,
+            ],
+            outputs=[wp.array(picture, dtype=wp.uint8, device="cpu", copy=False)],
+            device="cpu",
+        )
+        return picture
+
+    def sees(self, eye: np.ndarray, target: np.ndarray) -> bool:
+        """Whether nothing of the world lies between two points [m]."""
+        way = np.asarray(target, np.float64) - np.asarray(eye, np.float64)
+        query = wp.empty(1, dtype=float, device="cpu")
+        wp.launch(
+            cast_rays,
+            dim=1,
+            inputs=[
+                wp.array([self._world.id], dtype=wp.uint64, device="cpu"),
+                wp.zeros(1, dtype=int, device="cpu"),
+                wp.array([eye], dtype=wp.vec3, device="cpu"),
+                wp.array([way], dtype=wp.vec3, device="cpu"),
+                1.0,
+            ],
+            outputs=[query],
+            device="cpu",
+        )
+        return bool(query.numpy()[0] >= 1.0)
+
+    def _enclose(self, positions: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, float]:
+        """A ball around the whole robot: what misses it need not be tried against every body."""
+        frames = self._frame_of
+        centres = positions[frames] + np.einsum("nij,nj->ni", rotations[frames], self._centres)
+        middle = (centres.min(0) + centres.max(0)) / 2
+        return middle, float((np.linalg.norm(centres - middle, axis=1) + self._radii).max())
+
+
+def _corner_normals(vertices: np.ndarray, faces: np.ndarray) -> Float[np.ndarray, "c 3"]:
+    """Normals at the three corners of every face, rounded over edges that are flatter than the crease angle."""
+    corners = vertices[faces].astype(np.float64)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1, keepdims=True)
+    unit = normals / np.maximum(areas, 1e-20)
+    # Vertices may be stored once for each face (STL): what counts is where they are.
+    _, point = np.unique(np.round(corners.reshape(-1, 3), 6), axis=0, return_inverse=True)
+    point = point.reshape(-1, 3)
+    order = np.argsort(point.ravel(), kind="stable")
+    bounds = np.searchsorted(point.ravel()[order], np.arange(point.max() + 2))
+    result = np.repeat(unit, 3, axis=0)
+    for k in range(len(bounds) - 1):
+        at = order[bounds[k] : bounds[k + 1]]
+        face = at // 3
+        like = unit[face] @ unit[face].T > math.cos(_CREASE)
+        mean = like @ (normals[face])
+        result[at] = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-20)
+    return result

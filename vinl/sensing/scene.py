@@ -1,0 +1,114 @@
+"""Coloured meshes of homes for pictures: walls cut low, so that a camera above them sees inside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from vinl.world.blocks import Blocks
+from vinl.world.boxes import Boxes
+from vinl.world.grid import GridFrame
+from vinl.world.mesh import TRIANGLES_PER_BOX, box_mesh, floor_mesh, join_meshes
+
+Colour = tuple[float, float, float]
+"""Red, green, blue, 0 to 1."""
+
+WALL, FLOOR, BLOCK, GOAL = (0.90, 0.89, 0.86), (0.80, 0.74, 0.66), (0.86, 0.40, 0.20), (0.15, 0.62, 0.35)
+FURNITURE = (
+    (0.56, 0.62, 0.68),
+    (0.69, 0.58, 0.47),
+    (0.52, 0.60, 0.54),
+    (0.66, 0.55, 0.60),
+    (0.74, 0.68, 0.55),
+    (0.48, 0.53, 0.62),
+)
+"""Muted, so that robot and blocks stand out."""
+
+
+@runtime_checkable
+class Home(Protocol):
+    """What a picture needs of a floor plan."""
+
+    @property
+    def walls(self) -> Boxes: ...
+
+    @property
+    def furniture(self) -> Boxes: ...
+
+    @property
+    def frame(self) -> GridFrame: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A world that does not move.
+
+    Attributes:
+        vertices: (v, 3) [m].
+        faces: (f, 3).
+        colours: (f, 3) red, green, blue of every face, 0 to 1.
+        checker: (f,) side of the squares drawn on a face [m], seen from above; 0 for none.
+    """
+
+    vertices: Float[np.ndarray, "v 3"]
+    faces: Int[np.ndarray, "f 3"]
+    colours: Float[np.ndarray, "f 3"]
+    checker: Float[np.ndarray, " f"]
+
+
+def plain_scene(
+    boxes: Boxes, colours: Sequence[Colour], frame: GridFrame, floor: Colour = FLOOR, checker: float = 0.5
+) -> Scene:
+    """Coloured boxes on a checked floor.
+
+    Args:
+        boxes: what stands there.
+        colours: one for each box.
+        frame: the floor covers this grid.
+        floor: its colour.
+        checker: side of its squares [m].
+    """
+    vertices, faces = join_meshes(box_mesh(boxes), floor_mesh(frame))
+    painted = np.repeat(np.array([*colours, floor]), [*[TRIANGLES_PER_BOX] * len(boxes), 2], axis=0)
+    sides = np.zeros(len(faces))
+    sides[-2:] = checker
+    return Scene(vertices, faces, painted.astype(np.float32), sides.astype(np.float32))
+
+
+def plan_scene(
+    plan: Home,
+    blocks: Blocks | None = None,
+    goal: tuple[float, float] | None = None,
+    wall_height: float = 1.0,
+    furniture_height: float = 1.0,
+) -> Scene:
+    """A home as a doll's house: no ceiling, walls and tall furniture cut off.
+
+    Args:
+        plan: walls, furniture and grid.
+        blocks: the clutter.
+        goal: where the robot shall go [m]; marked by a thin green square on the floor.
+        wall_height: walls are cut here [m].
+        furniture_height: furniture is cut here [m].
+    """
+    parts, colours = [], []
+    for boxes, height, palette in (
+        (plan.walls, wall_height, (WALL,)),
+        (plan.furniture, furniture_height, FURNITURE),
+    ):
+        cut = boxes.rows[boxes.rows[:, 5] < height - 0.02].copy()
+        # Boxes that overlap must not be cut in one plane: their colours would mix in a speckle.
+        cut[:, 6] = np.minimum(cut[:, 6], height - 0.0007 * (np.arange(len(cut)) % 7))
+        parts.append(cut)
+        colours += [palette[k % len(palette)] for k in range(len(cut))]
+    if blocks is not None:
+        parts.append(blocks.boxes().rows)
+        colours += [BLOCK] * len(blocks)
+    if goal is not None:
+        parts.append(np.array([[goal[0], goal[1], np.pi / 4, 0.4, 0.4, 0.0, 0.01]]))
+        colours.append(GOAL)
+    return plain_scene(Boxes(np.concatenate(parts)), colours, plan.frame)
