@@ -59,6 +59,9 @@ class DepthCamera:
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:0"``.
         dtype: ``torch.float32`` or ``torch.float16`` depth.
 
+    Attributes:
+        mesh_ids: Warp's handles of the meshes, world by world, for kernels of one's own.
+
     Raises:
         InputError: no mesh, a broken mesh, a dtype that is neither of the two, or a GPU that is not there.
     """
@@ -79,7 +82,7 @@ class DepthCamera:
         self.dtype = dtype
         self._warp_device = str(self.device)
         self._meshes = [build_mesh(vertices, faces, self._warp_device) for vertices, faces in meshes]
-        self._ids = wp.array([mesh.id for mesh in self._meshes], dtype=wp.uint64, device=self._warp_device)
+        self.mesh_ids = wp.array([mesh.id for mesh in self._meshes], dtype=wp.uint64, device=self._warp_device)
         self._mount = self._on_device(np.array(camera.position))
         self._turn = self._on_device(camera.rotation())
         self._tan_half = self._on_device(np.array([camera.tan_half]))
@@ -148,7 +151,7 @@ class DepthCamera:
             render_depth,
             dim=shape,
             inputs=[
-                self._ids,
+                self.mesh_ids,
                 wp.from_torch(self._world(world), dtype=wp.int32),
                 wp.from_torch(position.contiguous(), dtype=wp.vec3),
                 wp.from_torch(rotation.contiguous(), dtype=wp.mat33),
