@@ -1,0 +1,99 @@
+"""``vinl eval``: the whole chain in MuJoCo C."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+
+from vinl.cli.options import parse_options
+from vinl.config.errors import InputError
+
+
+@dataclass(frozen=True)
+class Options:
+    """Walk a robot through floor plans and measure how it went: results.json, report.html and films."""
+
+    out: str
+    """Folder for results.json, report.html and films."""
+    floorplans: tuple[str, ...] = ()
+    """Files (.png, .pgm, ROS .yaml, ProcTHOR .json or .jsonl.gz:17) or names of shipped plans; all shipped ones by
+    default."""
+    loco: str = "rough"
+    """Locomotor: a shipped policy's name, or a policy folder."""
+    nav: str = "oracle"
+    """Navigator: oracle."""
+    episodes: int = 10
+    """Start/goal pairs in each plan; the same for all seeds."""
+    seeds: int = 5
+    """Repetitions: a seed changes clutter, heading and joint angles at the start."""
+    first_seed: int = 0
+    """The first of the seeds."""
+    obstacles: str = "none"
+    """Clutter: none, paper or dense."""
+    video: bool = False
+    """Film the first episode of every plan."""
+    video_all: bool = False
+    """Film all episodes of the first seed."""
+    workers: int | None = None
+    """Processes; the number of cores by default. Results do not depend on it."""
+    device: str = "cpu"
+    """Device of the policies: cpu or cuda. Only cpu repeats bit for bit."""
+    resolution: float | None = None
+    """Metres per pixel of floor plans that are bare pictures; 0.05 if not given."""
+    min_speck: int = 0
+    """Pieces of wall of fewer pixels than this are dropped from pictures and ROS maps."""
+    config: str = "eval/default"
+    """Rules of the episodes: a shipped config or a YAML file."""
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="KEY=VALUE")] = ()
+    """Changes to the config, for example time_limit=60."""
+
+
+def main(argv: list[str]) -> int:
+    """Run the evaluation and print where its files lie."""
+    options = parse_options(Options, argv, "eval")
+    from rich.console import Console
+
+    from vinl.config.loader import load_config
+    from vinl.evaluation.config import EvaluationConfig
+    from vinl.evaluation.evaluate import Films, check_numbers, evaluate
+    from vinl.evaluation.progress import Progress
+    from vinl.evaluation.report import write_report
+    from vinl.evaluation.results_file import check_out, results_as_dict, strip_command, write_json
+    from vinl.evaluation.summary import print_summary
+    from vinl.policies.io import load_policy
+    from vinl.world.readers import load_floorplans
+
+    out = check_out(options.out)
+    workers = os.cpu_count() or 1 if options.workers is None else options.workers
+    films: Films = "all" if options.video_all else "first" if options.video else "none"
+    check_numbers(options.episodes, options.seeds, options.first_seed, options.obstacles, workers)
+    config = load_config(EvaluationConfig, options.config, options.set)
+    policy = load_policy(options.loco, options.device)
+    plans = load_floorplans(options.floorplans, options.resolution, options.min_speck)
+    if not plans:
+        raise InputError("no floor plan is shipped with this version; give files: --floorplans FILE")
+    console = Console()
+    with Progress(console) as progress:
+        results = evaluate(
+            plans,
+            policy,
+            options.nav,
+            options.episodes,
+            options.seeds,
+            options.first_seed,
+            options.obstacles,
+            config,
+            workers,
+            films,
+            out,
+            progress.show,
+        )
+    data = results_as_dict(results, ["vinl", "eval", *strip_command(argv)], workers)
+    write_json(out / "results.json", data)
+    write_report(out / "report.html", results, shlex.join(data["command"]))
+    print_summary(console, results, out)
+    return 0

@@ -1,0 +1,118 @@
+"""Worker processes: each takes whole units of work; what they return does not depend on how many there are."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import pickle
+import queue
+import signal
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import torch
+
+T = TypeVar("T")
+POLL = 0.1
+"""Seconds between two looks at the workers' messages."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a job gets beside its own arguments.
+
+    Attributes:
+        shared: what ``Crew`` was made with.
+        tell: report one finished piece of work.
+        is_stopped: whether the user wants to stop.
+    """
+
+    shared: Any
+    tell: Callable[[], None]
+    is_stopped: Callable[[], bool]
+
+
+class Crew:
+    """Runs jobs ``work(context, job)`` in ``workers`` processes, or in this one if there is one worker.
+
+    Torch uses one thread everywhere, so that sums are added in the same order in any process.
+
+    Args:
+        workers: number of processes.
+        shared: handed to every job; pickled once a process.
+    """
+
+    def __init__(self, workers: int, shared: Any) -> None:
+        self._workers, self._shared = workers, shared
+        self._pool: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> Crew:
+        if self._workers > 1:
+            # spawn, not fork: forked children of a process with torch's threads may hang
+            context = multiprocessing.get_context("spawn")
+            self._messages, self._stop = context.Queue(), context.Event()
+            self._pool = ProcessPoolExecutor(
+                self._workers, context, _start, (pickle.dumps(self._shared), self._messages, self._stop)
+            )
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
+        if self._pool is None:
+            return
+        if kind is not None:
+            self._stop.set()
+        self._pool.shutdown(wait=True, cancel_futures=True)
+        self._messages.cancel_join_thread()
+        self._messages.close()
+
+    def run(self, work: Callable[[Context, Any], T], jobs: list[Any], on_piece: Callable[[], None]) -> list[T]:
+        """All jobs; the answers in the order of the jobs. ``on_piece`` is called for each piece that a job reports."""
+        if self._pool is None:
+            with one_thread():
+                context = Context(self._shared, on_piece, lambda: False)
+                return [work(context, job) for job in jobs]
+        futures = [self._pool.submit(_run, work, job) for job in jobs]
+        open_ = set(futures)
+        while open_:
+            done, open_ = wait(open_, timeout=POLL, return_when=FIRST_COMPLETED)
+            self._drain(on_piece)
+            for future in done:
+                future.result()  # the first failure ends it all
+        answers = [future.result() for future in futures]
+        self._drain(on_piece)
+        return answers
+
+    def _drain(self, on_piece: Callable[[], None]) -> None:
+        with contextlib.suppress(queue.Empty):
+            while True:
+                self._messages.get_nowait()
+                on_piece()
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Torch with one thread, and as before afterwards."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+_context: Context | None = None
+
+
+def _start(shared: bytes, messages: Any, stop: Any) -> None:
+    """First thing in a worker. Ctrl-C reaches the whole group: only the parent answers it."""
+    global _context
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    torch.set_num_threads(1)
+    _context = Context(pickle.loads(shared), lambda: messages.put(1), stop.is_set)
+
+
+def _run(work: Callable[[Context, Any], T], job: Any) -> T:
+    assert _context is not None
+    return work(_context, job)

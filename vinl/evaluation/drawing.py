@@ -1,0 +1,154 @@
+"""Drawings of the report as SVG text: maps in metres, histograms in pixels. Colours are left to the page's style."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+from PIL import Image
+
+from vinl.evaluation.contact import KINDS
+from vinl.evaluation.records import Episode, EpisodeTrace
+from vinl.robot.aliengo import LENGTH
+from vinl.world.blocks import Blocks
+from vinl.world.boxes import Boxes
+from vinl.world.floorplan import FloorPlan
+
+CONTACT_CLASS = dict(zip(KINDS, ("fb", "fw", "lb", "lw", "tb", "tw"), strict=True))
+"""Style class of each kind of contact."""
+
+_MARGIN = 0.4
+_GRAIN = 0.02
+
+
+def outline_boxes(boxes: Boxes) -> str:
+    """Path data of the footprints [m], y up turned to y down."""
+    if not len(boxes):
+        return ""
+    return "".join("M" + "L".join(f"{x:.2f} {-y:.2f}" for x, y in corners) + "Z" for corners in boxes.corners())
+
+
+def outline_way(path: Float[np.ndarray, "k 2"]) -> str:
+    """Path data of a way [m]: every second point, to the centimetre."""
+    points = path[::2] if len(path) > 4 else path
+    return "M" + "L".join(f"{x:.2f} {-y:.2f}" for x, y in np.vstack([points, path[-1]]))
+
+
+def mark_contacts(trace: EpisodeTrace) -> list[tuple[str, str]]:
+    """Style class and path data of every kind of contact: a dot at each place, places 2 cm apart told apart."""
+    marks = []
+    for kind, name in enumerate(KINDS):
+        at = trace.contacts[trace.contacts[:, 1] == kind, 2:]
+        if len(at):
+            places = np.unique(np.rint(at / _GRAIN), axis=0) * _GRAIN
+            marks.append((CONTACT_CLASS[name], "".join(f"M{x:.2f} {-y:.2f}h0" for x, y in places)))
+    return marks
+
+
+def draw_floor(inside: Bool[np.ndarray, "rows columns"]) -> str:
+    """The inside of the building as a small picture with a transparent outside, as a data address."""
+    alpha = (inside[::-1] * 255).astype(np.uint8)
+    grey = np.full_like(alpha, 128)
+    file = io.BytesIO()
+    Image.fromarray(np.stack([grey, (alpha * 0.13).astype(np.uint8)], -1), "LA").save(file, "PNG", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode()
+
+
+def draw_map(plan: FloorPlan, episodes: Sequence[Episode], first: int, radius: float) -> str:
+    """A floor plan with all ways through it.
+
+    Args:
+        plan: the floor plan.
+        episodes: those of this plan.
+        first: number of the first one on the page; the others follow.
+        radius: of the goals [m].
+    """
+    cells = np.argwhere(plan.inside)
+    low, high = plan.frame.xy(cells.min(0)) - _MARGIN, plan.frame.xy(cells.max(0)) + _MARGIN
+    x, y = plan.frame.centres()
+    half = plan.frame.resolution / 2
+    width, height = high - low
+    parts = [
+        f'<svg class="map" viewBox="{low[0]:.2f} {-high[1]:.2f} {width:.2f} {height:.2f}" role="img" '
+        f'style="--w:{width / height:.3f}">',
+        f'<image href="{draw_floor(plan.inside)}" x="{x[0] - half:.3f}" y="{-y[-1] - half:.3f}" '
+        f'width="{x[-1] - x[0] + 2 * half:.3f}" height="{y[-1] - y[0] + 2 * half:.3f}" preserveAspectRatio="none"/>',
+        f'<path class="furniture" d="{outline_boxes(plan.furniture)}"/>',
+        f'<path class="wall" d="{outline_boxes(plan.walls)}"/>',
+    ]
+    for k, episode in enumerate(episodes):
+        record, trace = episode.record, episode.trace
+        marks = "".join(f'<path class="touch {name}" d="{data}"/>' for name, data in mark_contacts(trace))
+        ex, ey = trace.path[-1]
+        lost = "" if record.success else f'<path class="lost" d="{_cross(ex, ey)}"/>'
+        parts.append(
+            f'<g class="ep {record.end_reason}" id="e{first + k}"><path class="block" '
+            f'd="{outline_boxes(Blocks(trace.blocks).boxes())}"/><path class="way" d="{outline_way(trace.path)}"/>'
+            f"{marks}{lost}<title>episode {record.episode}, seed {record.seed}: {record.end_reason}, "
+            f"{record.distance_m:.1f} m in {record.time_s:.0f} s</title></g>"
+        )
+    for record in {e.record.episode: e.record for e in episodes}.values():
+        (sx, sy), (gx, gy) = record.start, record.goal
+        parts.append(
+            f'<g class="route" data-episode="{record.episode}"><circle class="start" cx="{sx:.2f}" cy="{-sy:.2f}" '
+            f'r="{LENGTH / 5:.2f}"/><circle class="goal" cx="{gx:.2f}" cy="{-gy:.2f}" r="{radius:.2f}"/>'
+            f'<text x="{gx:.2f}" y="{-gy + 0.11:.2f}">{record.episode}</text></g>'
+        )
+    bar = 1 if width < 15 else 5
+    bx, by = low[0] + 0.15, -low[1] - 0.12
+    parts.append(
+        f'<g class="scale"><path d="M{bx:.2f} {by:.2f}h{bar}"/>'
+        f'<text x="{bx + bar + 0.1:.2f}" y="{by + 0.1:.2f}">{bar} m</text></g></svg>'
+    )
+    return "".join(parts)
+
+
+def draw_histogram(values: Sequence[float], title: str, low: float = 0.0, high: float | None = None) -> str:
+    """A histogram of 20 bars with its mean.
+
+    Args:
+        values: what to count.
+        title: what it is, with its unit.
+        low, high: range; up to the largest value by default.
+    """
+    v = np.asarray([x for x in values if np.isfinite(x)], dtype=np.float64)
+    top = high if high is not None else _nice(float(v.max()) if len(v) else 1.0)
+    counts, _ = np.histogram(np.clip(v, low, top), bins=20, range=(low, top))
+    peak = max(int(counts.max()), 1)
+    w, h, base = 300, 150, 118
+    bars = "".join(
+        f'<rect x="{14 + k * 13.6:.1f}" y="{base - 84 * c / peak:.1f}" width="12.2" height="{84 * c / peak:.1f}" rx="1.5"/>'
+        for k, c in enumerate(counts)
+        if c
+    )
+    mean = ""
+    if len(v):
+        x = 14 + 272 * (min(max(float(v.mean()), low), top) - low) / (top - low)
+        side, shift = ("end", -4) if x > 200 else ("start", 4)
+        mean = (
+            f'<path class="mean" d="M{x:.1f} 22V{base}"/>'
+            f'<text class="mean" x="{x + shift:.1f}" y="30" text-anchor="{side}">mean {v.mean():.3g}</text>'
+        )
+    ticks = "".join(
+        f'<text class="tick" x="{14 + 272 * f:.0f}" y="134" text-anchor="{a}">{low + f * (top - low):.3g}</text>'
+        for f, a in ((0.0, "start"), (0.5, "middle"), (1.0, "end"))
+    )
+    return (
+        f'<svg class="histogram" viewBox="0 0 {w} {h}" role="img"><title>{title}</title>'
+        f'<text class="title" x="14" y="12">{title}</text>{bars}<path class="axis" d="M14 {base}H286"/>{mean}{ticks}</svg>'
+    )
+
+
+def _cross(x: float, y: float, size: float = 0.12) -> str:
+    return f"M{x - size:.2f} {-y - size:.2f}l{2 * size} {2 * size}m0 {-2 * size}l{-2 * size} {2 * size}"
+
+
+def _nice(value: float) -> float:
+    """The next round number."""
+    if value <= 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(next(m for m in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if m * power >= value * 0.9999) * power)

@@ -1,0 +1,92 @@
+"""``report.html``: one self-contained page with table, maps and histograms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from vinl.evaluation.drawing import draw_histogram, draw_map
+from vinl.evaluation.metrics import aggregate_episodes
+from vinl.evaluation.records import EpisodeRecord, Results
+from vinl.evaluation.results_file import describe_environment, write_text
+
+PAPER_ROWS = (
+    ("Paper: ViNL, clutter", "73.6 ± 5.9", "8.19 ± 0.34", "12.1 ± 0.7"),
+    ("Paper: ViNL, no clutter", "86.8 ± 4.7", "7.67 ± 0.35", "2.9 ± 0.3"),
+    ("Paper: Rough, clutter", "40.8 ± 3.5", "7.59 ± 0.17", "16.5 ± 2.5"),
+)
+"""Success in percent, distance [m], foot collisions per metre [paper, table II]."""
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One line of the table of failures or of all episodes."""
+
+    number: int
+    record: EpisodeRecord
+
+
+def render_report(results: Results, command: str) -> str:
+    """The page as text.
+
+    Args:
+        results: what ``evaluate`` returned.
+        command: shown as the way to repeat it.
+    """
+    rows = [_Row(k, episode.record) for k, episode in enumerate(results.episodes)]
+    rules = results.config["evaluation"]
+    plans = []
+    for plan in results.plans:
+        mine = [row.number for row in rows if row.record.plan == plan.name]
+        if not mine:
+            continue
+        episodes = [results.episodes[k] for k in mine]
+        assert mine == list(range(mine[0], mine[0] + len(mine))), "episodes of a plan stand together"
+        plans.append(
+            {
+                "plan": plan,
+                "map": draw_map(plan, episodes, mine[0], rules["success_radius"]),
+                "aggregate": aggregate_episodes([e.record for e in episodes], rules["min_metres"]),
+                "rows": [rows[k] for k in mine],
+                "notes": sorted({e.record.note for e in episodes if e.record.note}),
+            }
+        )
+    walked = [r for r in results.records if r.distance_m >= rules["min_metres"]]
+    histograms = [
+        draw_histogram([r.spl for r in results.records], "SPL", 0.0, 1.0),
+        draw_histogram([r.distance_m for r in results.records], "distance walked [m]"),
+        draw_histogram([r.time_s for r in results.records], "time [s]"),
+        draw_histogram([r.foot_steps / r.distance_m for r in walked], "foot collisions per metre"),
+    ]
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("vinl.evaluation"), autoescape=True, undefined=jinja2.StrictUndefined
+    )
+    environment.filters["figure"] = format_figure
+    return environment.get_template("report.html.j2").render(
+        aggregate=results.aggregate,
+        plans=plans,
+        failures=[row for row in rows if not row.record.success],
+        histograms=histograms,
+        paper=PAPER_ROWS,
+        config=results.config,
+        policies=results.policies,
+        environment=describe_environment(),
+        videos=results.videos,
+        command=command,
+        wall_seconds=results.wall_seconds,
+    )
+
+
+def write_report(path: Path, results: Results, command: str) -> None:
+    """Write the page, whole or not at all."""
+    write_text(path, render_report(results, command))
+
+
+def format_figure(figure: dict[str, Any], digits: int = 2, factor: float = 1.0) -> str:
+    """``mean ± deviation of the seeds``, or a dash."""
+    if figure["mean"] is None:
+        return "–"
+    return f"{factor * figure['mean']:.{digits}f} ± {factor * figure['std_over_seeds']:.{digits}f}"

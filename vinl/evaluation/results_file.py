@@ -1,0 +1,115 @@
+"""``results.json``: everything that was measured and what is needed to repeat it; written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import tempfile
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from vinl.config.errors import InputError
+from vinl.evaluation.metrics import aggregate_episodes
+from vinl.evaluation.records import Results, plain_record
+
+SCHEMA = 1
+"""Version of ``results.json``. Names stay; new ones may be added without a new version."""
+
+_PACKAGES = ("vinl", "mujoco", "numpy", "scipy", "scikit-image", "torch", "warp-lang")
+
+
+def results_as_dict(results: Results, command: Sequence[str], workers: int) -> dict[str, Any]:
+    """Results as plain data. Two runs with the same seed differ in ``timing`` and ``aggregate.wall_seconds`` only."""
+    records = results.records
+    min_metres = results.config["evaluation"]["min_metres"]
+    plans = [
+        {
+            "name": plan.name,
+            "source": plan.source,
+            "area_m2": round(plan.area_m2, 2),
+            "aggregate": aggregate_episodes([r for r in records if r.plan == plan.name], min_metres),
+        }
+        for plan in results.plans
+    ]
+    wall = round(results.wall_seconds, 2)
+    return {
+        "schema": SCHEMA,
+        "command": list(command),
+        "config": results.config,
+        "policies": results.policies,
+        "environment": describe_environment(),
+        "plans": plans,
+        "aggregate": {**results.aggregate, "wall_seconds": wall},
+        "episodes": [plain_record(r) for r in records],
+        "timing": {"wall_seconds": wall, "workers": workers},
+    }
+
+
+def describe_environment() -> dict[str, str]:
+    """Versions that figures may depend on."""
+    found = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def strip_command(argv: Sequence[str]) -> list[str]:
+    """A command line without ``--out`` and ``--workers``, which no figure depends on."""
+    kept: list[str] = []
+    words = iter(argv)
+    for word in words:
+        if word in ("--out", "--workers"):
+            next(words, None)
+        elif not word.startswith(("--out=", "--workers=")):
+            kept.append(word)
+    return kept
+
+
+def check_out(out: str | Path) -> Path:
+    """The folder to write to, which need not exist yet.
+
+    Raises:
+        InputError: it, or a folder above it, is a file, or may not be written to.
+    """
+    out = Path(out)
+    for path in (out, *out.parents):
+        if path.is_dir():
+            if not os.access(path, os.W_OK):
+                raise InputError(f"--out {out}: {path} may not be written to; choose another folder")
+            return out
+        if path.exists():
+            raise InputError(f"--out {out}: {path} is a file; choose another folder")
+    return out
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole or not at all; an older one is replaced."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, scratch = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(scratch).chmod(0o644)
+        Path(scratch).replace(path)
+    except BaseException:
+        Path(scratch).unlink(missing_ok=True)
+        raise
+
+
+def write_json(path: Path, data: dict[str, Any]) -> None:
+    """Write JSON; one episode a line, so that a person can read it and two runs can be compared line by line."""
+    body = []
+    for key, value in data.items():
+        if key in ("episodes", "robots") and isinstance(value, list):
+            rows = ",\n".join("    " + json.dumps(row, allow_nan=False) for row in value)
+            body.append(f'  "{key}": [\n{rows}\n  ]')
+        else:
+            text = json.dumps(value, indent=2, allow_nan=False).replace("\n", "\n  ")
+            body.append(f'  "{key}": {text}')
+    write_text(path, "{\n" + ",\n".join(body) + "\n}\n")

@@ -1,0 +1,143 @@
+"""A film of an episode: the robot from behind, what its cameras see, the map with the path so far."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from vinl.evaluation.config import EvaluationConfig
+from vinl.evaluation.panels import MapPanel, colour_depth, compose
+from vinl.evaluation.records import Episode
+from vinl.evaluation.rollout import Interrupted
+from vinl.robot.aliengo import CONTROL_DT
+from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
+from vinl.robot.rotation import matrix_of, yaw_of
+from vinl.sensing.chase import ChaseCamera
+from vinl.sensing.depth import DepthCamera
+from vinl.sensing.raytrace import RayRenderer
+from vinl.sensing.robot_shape import RobotShape
+from vinl.sensing.scene import plan_scene
+from vinl.world.blocks import Blocks
+from vinl.world.floorplan import FloorPlan
+from vinl.world.mesh import floorplan_mesh
+
+POSE_DT = 2 * CONTROL_DT
+"""Time between two recorded poses [s]."""
+
+FPS = 12.5
+"""Pictures a second of a film: every second pose at natural speed."""
+
+MAX_FRAMES = 500
+"""A film of more pictures than this (40 s) runs at twice, three times ... the natural speed instead."""
+
+ROBOT_SIZE = (800, 640)
+"""Width and height of the picture of the robot [pixels]."""
+
+
+@dataclass(frozen=True, eq=False)
+class FilmJob:
+    """An episode with recorded poses, and the folder for its film."""
+
+    plan: FloorPlan
+    episode: Episode
+    out: str
+
+    @property
+    def name(self) -> str:
+        """File name: plan, episode, seed."""
+        record = self.episode.record
+        return re.sub(r"[^\w.-]+", "_", f"{record.plan}_episode{record.episode}_seed{record.seed}") + ".mp4"
+
+
+def film(job: FilmJob, config: EvaluationConfig, is_stopped: Callable[[], bool] = lambda: False) -> str:
+    """Write the film of an episode, whole or not at all.
+
+    Returns:
+        The file's name in the folder.
+
+    Raises:
+        Interrupted: ``is_stopped`` said so.
+    """
+    out = Path(job.out)
+    out.mkdir(parents=True, exist_ok=True)
+    scratch = out / f".{job.name}"
+    writer = None
+    try:
+        for frame in draw_frames(job, config):
+            if is_stopped():
+                raise Interrupted
+            if writer is None:
+                size = (frame.shape[1], frame.shape[0])
+                writer = imageio_ffmpeg.write_frames(
+                    str(scratch), size, fps=FPS, codec="libx264", quality=6, macro_block_size=16, ffmpeg_log_level="error"
+                )
+                writer.send(None)
+            writer.send(np.ascontiguousarray(frame))
+        if writer is not None:
+            writer.close()
+        scratch.replace(out / job.name)
+    finally:
+        if writer is not None:
+            writer.close()
+        scratch.unlink(missing_ok=True)
+    return job.name
+
+
+def draw_frames(job: FilmJob, config: EvaluationConfig) -> Iterator[UInt8[np.ndarray, "height width 3"]]:
+    """The pictures of a film, one after another."""
+    trace, record = job.episode.trace, job.episode.record
+    pace = 1 + (len(trace.poses) // 2) // MAX_FRAMES
+    chosen = np.arange(0, len(trace.poses), 2 * pace)
+    poses = trace.poses[chosen]
+    blocks = Blocks(trace.blocks)
+    eyes = [_see(job.plan, blocks, camera, poses) for camera in (LOCOMOTION_CAMERA, NAVIGATION_CAMERA)]
+    shape = RobotShape()
+    renderer = RayRenderer(plan_scene(job.plan, blocks, goal=record.goal), shape.bodies, shape.names)
+    chase = ChaseCamera(renderer)
+    map_panel = MapPanel(job.plan, blocks, record, config.success_radius)
+    yaw = yaw_of(np, poses[:, 3:7])
+    speed = _speeds(trace.poses, yaw_of(np, trace.poses[:, 3:7]))[chosen]
+    for k, pose in enumerate(poses):
+        time = float(chosen[k]) * POSE_DT
+        seen = trace.contacts[trace.contacts[:, 0] <= time]
+        picture = renderer.render(chase.follow(pose[:3], float(yaw[k])), *ROBOT_SIZE, *shape.place(pose))
+        captions = [
+            f"{time:5.1f} s" + (f"   ({pace} x)" if pace > 1 else ""),
+            f"command {trace.commands[chosen[k], 0]:.2f} m/s, {trace.commands[chosen[k], 2]:+.2f} rad/s",
+            f"speed {speed[k]:.2f} m/s",
+            f"contact steps: foot {_count_steps(seen, (0, 1))}, leg {_count_steps(seen, (2, 3))}",
+            "" if k < len(poses) - 1 else record.end_reason,
+        ]
+        path = trace.poses[: chosen[k] + 1 : 2, :2]
+        yield compose(
+            picture,
+            [colour_depth(eye[k], camera.far) for eye, camera in zip(eyes, (LOCOMOTION_CAMERA, NAVIGATION_CAMERA))],
+            map_panel.draw(path, seen, pose[:2], float(yaw[k])),
+            captions,
+        )
+
+
+def _see(plan: FloorPlan, blocks: Blocks, camera: Camera, poses: np.ndarray) -> Float[np.ndarray, "n h w"]:
+    mesh = floorplan_mesh(plan, blocks)
+    depth = DepthCamera([mesh], camera).render(
+        np.zeros(len(poses), np.int32), poses[:, :3], matrix_of(np, poses[:, 3:7])
+    )
+    return depth.numpy()
+
+
+def _speeds(poses: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """Forward speed [m/s] at each pose, over 0.2 s."""
+    step = np.gradient(poses[:, :2], POSE_DT, axis=0) if len(poses) > 1 else np.zeros((len(poses), 2))
+    ahead = step[:, 0] * np.cos(yaw) + step[:, 1] * np.sin(yaw)
+    return np.convolve(np.pad(ahead, 2, mode="edge"), np.full(5, 0.2), mode="valid")
+
+
+def _count_steps(contacts: np.ndarray, kinds: tuple[int, ...]) -> int:
+    """Control steps with a contact of one of the kinds."""
+    return len(np.unique(contacts[np.isin(contacts[:, 1], kinds), 0]))
