@@ -12,6 +12,7 @@ import json
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -157,18 +158,19 @@ class Home:
     windows: list[dict] = field(default_factory=list)
     furniture: list[dict] = field(default_factory=list)
     walls: list[dict] = field(default_factory=list)
+    taken: list[tuple[str, shapely.Geometry]] = field(default_factory=list)
 
     def raise_walls(self) -> None:
         """Walls from the rooms' outlines, less the open lines, plus the free-standing stubs."""
         outlines = {name: shapely.Polygon(points) for name, points in self.rooms.items()}
         shell = unary_union([outline.buffer(1e-4, join_style="mitre") for outline in outlines.values()])
+        assert isinstance(shell, shapely.Polygon), "the rooms must hang together"
         rim = shell.exterior.buffer(0.01)
         edges = unary_union([outline.exterior for outline in outlines.values()])
         # without the lines that stay open
         gone = unary_union([shapely.LineString([line[:2], line[2:]]).buffer(0.005) for line in self.open_lines])
-        inside = edges.difference(rim).difference(gone)
-        outline = shapely.Polygon(shell.exterior).simplify(0.005)
-        for a, b in pairwise(list(outline.exterior.coords)):
+        inside: Any = edges.difference(rim).difference(gone)
+        for a, b in pairwise(list(shell.exterior.simplify(0.005).coords)):
             self.walls.append({"from": _round(a), "to": _round(b), "thickness": self.outer})
         merged = linemerge(inside) if inside.geom_type == "MultiLineString" else inside
         for line in getattr(merged, "geoms", [merged]):
@@ -199,8 +201,13 @@ class Home:
         for a, b, left, right, top in parts:
             u, v = (a + b) / 2, (left + right) / 2
             boxes.append((x + c * u - s * v, y + s * u + c * v, b - a, right - left, top))
-        shapes = unary_union([_rectangle(*box[:4], angle) for box in boxes])
+        shapes = unary_union([_rectangle(bx, by, depth, width, angle) for bx, by, depth, width, _ in boxes])
         shift = self._find_shift(shapes)
+        moved = shapely.affinity.translate(shapes, *shift)
+        for other, shape in self.taken:
+            if shapely.area(shapely.intersection(shape, moved)) > 1e-3:
+                print(f"{self.name}: {name} at ({x}, {y}) stands in the {other}")
+        self.taken.append((name, moved))
         for bx, by, depth, width, top in boxes:
             at = _round((bx + shift[0], by + shift[1]))
             piece = {"name": name, "at": at, "size": _round((depth, width)), "span": [0.0, round(top, 3)]}
@@ -446,7 +453,7 @@ def draw_old_town() -> Home:
     home.put("sofa", sofa(2.0), 4.6, 1.0, "E")
     home.put("armchair", armchair(), 8.2, 0.1, 120.0)
     home.put("round table", slab(0.9, 0.9, 0.5), 6.7, 1.0, 45.0)
-    home.put("grand piano", slab(1.5, 1.5, 1.0), 9.2, 1.6, 20.0)
+    home.put("grand piano", slab(1.45, 1.5, 1.0), 8.95, 1.5, 20.0)
     home.put("sideboard", chest(1.8, 0.45, 0.95), 8.4, 4.8, "S")
     home.put("bed", bed(1.6), 14.4, 0.9, "W")
     home.put("wardrobe", wardrobe(1.7), 14.4, 3.7, "W")
@@ -524,7 +531,7 @@ def draw_family_home() -> Home:
     home.put("bath", bath(1.8, 0.8), 13.9, 5.8, "W")
     home.put("basin", basin(1.2), 11.4, 6.8, "S")
     home.put("toilet", toilet(), 12.5, 6.8, "S")
-    home.put("cupboard", chest(0.8, 0.4, 1.9), 13.1, 4.6, "N")
+    home.put("cupboard", chest(0.7, 0.4, 1.9), 12.5, 4.6, "N")
     home.put("shower", shower(0.9), 8.6, 7.5, "W")
     home.put("toilet", toilet(), 5.9, 7.4, "E")
     home.put("basin", basin(0.5), 7.3, 8.0, "S")
@@ -534,7 +541,7 @@ def draw_family_home() -> Home:
     home.put("wardrobe", wardrobe(1.2), 6.6, 8.9, "E")
     home.put("desk", desk(1.1, 0.6), 10.2, 10.3, "W")
     home.put("bed", bed(1.2, 2.0, False), 13.9, 10.6, "W")
-    home.put("desk", desk(1.4, 0.65), 11.2, 11.2, "S")
+    home.put("desk", desk(1.2, 0.65), 10.95, 11.2, "S")
     home.put("wardrobe", wardrobe(1.6), 12.9, 6.8, "N")
     home.put("chest", chest(0.9, 0.42, 0.8), 10.2, 9.4, "E")
     return home

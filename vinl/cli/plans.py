@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+
+from tyro.conf import Positional
+
+from vinl.config.errors import InputError
+
+USAGE = """usage: vinl plans list             the floor plans that travel with the package
+       vinl plans show PATH ...    read a plan and draw it from above (vinl plans show --help)"""
 
 
 @dataclass(frozen=True)
 class ShowPlan:
     """Read a floor plan and draw it from above."""
 
-    path: str
+    path: Positional[str]
     """PNG, PGM, ROS map YAML, ProcTHOR JSON (file.jsonl.gz:17 for one of many) or the name of a shipped plan."""
     out: Path | None = None
     """PNG file for the picture; not drawn if left away."""
@@ -38,19 +44,18 @@ def main(argv: list[str]) -> int:
     Raises:
         InputError: if the plan or an option cannot be used.
     """
-    import tyro
+    from vinl.cli.options import parse_options
 
-    options = tyro.cli(
-        Annotated[ShowPlan, tyro.conf.subcommand("show"), tyro.conf.arg(name="")]  # type: ignore[arg-type]
-        | Annotated[ListPlans, tyro.conf.subcommand("list"), tyro.conf.arg(name="")],
-        args=argv,
-        prog="vinl plans",
-        config=(tyro.conf.PositionalRequiredArgs,),
-    )
-    if isinstance(options, ListPlans):
+    what = argv[0] if argv else "--help"
+    if what == "show":
+        _show_plan(parse_options(ShowPlan, argv[1:], "plans show"))
+    elif what == "list":
+        parse_options(ListPlans, argv[1:], "plans list")
         _list_plans()
+    elif what in ("-h", "--help"):
+        print(USAGE)
     else:
-        _show_plan(options)
+        raise InputError(f"vinl plans {what}: choose 'show' or 'list' (vinl plans --help)")
     return 0
 
 
@@ -65,7 +70,6 @@ def _list_plans() -> None:
 def _show_plan(options: ShowPlan) -> None:
     import numpy as np
 
-    from vinl.config.errors import InputError
     from vinl.world.clutter import CLUTTER, scatter_blocks
     from vinl.world.free_space import FreeSpace
     from vinl.world.geodesic import comfortable_path

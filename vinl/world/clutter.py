@@ -9,6 +9,7 @@ import shapely
 from jaxtyping import Float
 
 from vinl.world.blocks import Blocks
+from vinl.world.boxes import Boxes
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 
 _BATCH = 1024
@@ -67,7 +68,7 @@ def scatter_blocks(
         return Blocks.empty()
     boxes = plan.boxes
     low = boxes.rows[boxes.rows[:, 5] < BODY_HEIGHT] if len(boxes) else boxes.rows
-    obstacles = shapely.STRtree(shapely.polygons(type(boxes)(low).corners()) if len(low) else [])
+    obstacles = shapely.STRtree(list(map(shapely.Polygon, Boxes(low).corners())))
     placed = np.zeros((0, 6))
     idle = 0
     while len(placed) < wanted and idle < _IDLE_BATCHES:
@@ -97,7 +98,7 @@ def _fit(rows: np.ndarray, plan: FloorPlan, obstacles: shapely.STRtree) -> np.nd
     corners = Blocks(rows).boxes().corners()
     outline = np.concatenate([corners, (corners + np.roll(corners, 1, axis=1)) / 2], axis=1)
     cells = plan.frame.cell(outline)
-    fits = plan.inside[cells[..., 0], cells[..., 1]].all(1)
+    fits = np.all(plan.inside[cells[..., 0], cells[..., 1]], axis=1)
     hit, _ = obstacles.query(shapely.polygons(corners), predicate="intersects")
     fits[hit] = False
     return rows[fits]

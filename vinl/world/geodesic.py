@@ -60,7 +60,7 @@ def read_field(
             cell = np.clip(base + np.array([di, dj]), 0, np.array(frame.shape) - 1)
             way = np.linalg.norm(frame.xy(cell) - xy, axis=-1)
             best = np.minimum(best, field[cell[..., 0], cell[..., 1]] + way)
-    return best
+    return np.asarray(best)
 
 
 def shortest_path(

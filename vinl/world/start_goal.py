@@ -13,6 +13,9 @@ from vinl.world.floorplan import ROOM_TO_STAND, FloorPlan
 from vinl.world.free_space import FreeSpace
 from vinl.world.geodesic import distance_field
 
+LEAST_WAY = 1.0
+"""A plan without two spots this far apart [m] is refused: the robot would arrive where it starts."""
+
 _TRIES = 200
 
 
@@ -64,10 +67,13 @@ def sample_start_goals(
     if len(cells) < 2:
         cells = np.argwhere((space.regions == space.largest) & (space.clearance >= min(ROOM_TO_STAND, clearance)))
         notes.append(f"no clearance of {clearance:.2f} m, {ROOM_TO_STAND:.2f} m instead")
-    if len(cells) < 2:
-        raise InputError(f"{plan.source}: the plan is too small for the robot: no room to start and to arrive")
     spots = plan.frame.xy(cells)
-    widest = _measure_extent(spots)
+    widest = _measure_extent(spots) if len(spots) > 1 else 0.0
+    if widest < min(LEAST_WAY, min_distance):
+        raise InputError(
+            f"{plan.source}: the plan is too small for the robot: start and goal would be {widest:.1f} m apart; "
+            "check its scale (metres per pixel)"
+        )
     if widest < min_distance:
         min_distance = 0.9 * widest
         notes.append(f"start and goal are at most {widest:.1f} m apart in this plan")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 from jaxtyping import Bool, Float
+from shapely.ops import polylabel
 
 from vinl.world.grid import GridFrame
 
@@ -19,6 +20,6 @@ def paint_polygon(polygon: Float[np.ndarray, "k 2"], frame: GridFrame) -> Bool[n
 
 def place_label(polygon: Float[np.ndarray, "k 2"]) -> tuple[float, float]:
     """A point well inside the outline [m]: the middle of the largest circle in it."""
-    shape = shapely.make_valid(shapely.Polygon(polygon))
-    centre = shapely.maximum_inscribed_circle(shape, tolerance=0.1).coords[0]
-    return float(centre[0]), float(centre[1])
+    shape = shapely.Polygon(polygon)
+    point = polylabel(shape, 0.1) if shape.is_valid and shape.area > 0 else shape.centroid
+    return float(point.x), float(point.y)

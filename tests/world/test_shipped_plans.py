@@ -1,0 +1,43 @@
+import numpy as np
+import pytest
+
+from vinl.config.errors import InputError
+from vinl.world.drawing import draw_floorplan, save_floorplan
+from vinl.world.free_space import FreeSpace
+from vinl.world.readers import load_floorplan, load_floorplans, shipped_floorplans
+from vinl.world.start_goal import sample_start_goals
+
+NAMES = ["family_home", "garden_bungalow", "harbour_flat", "mill_loft", "old_town"]
+
+
+def test_there_are_five():
+    assert shipped_floorplans() == NAMES
+    assert [plan.name for plan in load_floorplans(["old_town", "mill_loft"])] == ["old_town", "mill_loft"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_shipped_plan_is_a_home(name):
+    plan = load_floorplan(name)
+    assert 60 <= plan.area_m2 <= plan.inside.sum() * plan.frame.resolution**2 <= 160
+    assert len(plan.furniture) >= 40 and len(plan.labels) >= 2
+    wide = FreeSpace(plan, radius=0.38)
+    assert (wide.regions == wide.largest).sum() >= 0.97 * wide.traversable.sum(), "every way is 0.76 m wide"
+    for label in plan.labels:
+        near = np.linalg.norm(plan.frame.xy(np.argwhere(wide.regions == wide.largest)) - [label.x, label.y], axis=1)
+        assert near.min() < 1.2, f"{label.name} is shut off"
+    pairs = sample_start_goals(plan, 6, np.random.default_rng(0))
+    assert all(pair.straight_m >= 5.0 and not pair.note for pair in pairs)
+    assert all(np.isfinite(pair.geodesic_m) for pair in pairs)
+
+
+def test_plans_are_drawn(tmp_path):
+    plan = load_floorplan("mill_loft")
+    pairs = sample_start_goals(plan, 1, np.random.default_rng(0))
+    out = save_floorplan(plan, tmp_path / "deep" / "loft.png", dpi=40, start_goals=pairs, paths=[np.zeros((2, 2))])
+    assert out.stat().st_size > 1000
+    assert "free floor" in draw_floorplan(plan).axes[0].get_title()
+    with pytest.raises(InputError, match=r"\.png"):
+        save_floorplan(plan, tmp_path / "loft.txt")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be written"):
+        save_floorplan(plan, tmp_path / "file" / "loft.png")
