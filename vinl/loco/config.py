@@ -197,6 +197,33 @@ class PpoConfig:
 
 
 @dataclass(frozen=True)
+class AnnealConfig:
+    """Settings that move towards others late in the training: first learn to walk at all, then to walk precisely.
+
+    Attributes:
+        begin, end: shares of the iterations between which the settings move, linearly.
+        sigma: ``rewards.sigma`` at the end [(m/s)^2].
+        entropy: ``ppo.entropy`` at the end.
+    """
+
+    begin: float = 0.6
+    end: float = 0.95
+    sigma: float = 0.25
+    entropy: float = 0.01
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.begin < self.end <= 1:
+            raise InputError(f"anneal: need 0 <= begin < end <= 1, got {self.begin} and {self.end}")
+        if self.sigma <= 0 or self.entropy < 0:
+            raise InputError("anneal: sigma must be positive and entropy not negative")
+
+    def blend(self, share: float, before: float, after: float) -> float:
+        """The value of a setting after a share of the iterations."""
+        moved = min(max((share - self.begin) / (self.end - self.begin), 0.0), 1.0)
+        return before + moved * (after - before)
+
+
+@dataclass(frozen=True)
 class LocoConfig:
     """One locomotion training.
 
@@ -222,6 +249,7 @@ class LocoConfig:
     randomisation: RandomisationConfig = field(default_factory=RandomisationConfig)
     curriculum: CurriculumConfig = field(default_factory=CurriculumConfig)
     ppo: PpoConfig = field(default_factory=PpoConfig)
+    anneal: AnnealConfig = field(default_factory=AnnealConfig)
 
     def __post_init__(self) -> None:
         if self.stage not in (1,):

@@ -30,6 +30,9 @@ _MAX_SPEED = 150.0
 _UPSIDE = -0.3
 """Third component of the gravity vector in the trunk above which the robot has fallen: tilted by more than 72 deg."""
 
+_MEASURE_SIGMA = 0.25
+"""Width of the tracking terms in the measures, whatever the reward's: curves of different trainings compare."""
+
 MEASURES = (
     "steps",
     "reward",
@@ -113,11 +116,13 @@ class LocoEnvironment:
         terrain: the ground with its tiles.
         state: of all robots; ``step`` replaces it.
         num_envs: number of robots.
+        sigma: width of the tracking rewards [(m/s)^2]; a training may narrow it.
     """
 
     def __init__(self, config: LocoConfig, seed: int | None = None) -> None:
         self.config = config
         self.num_envs = config.num_envs
+        self.sigma = config.rewards.sigma
         self.terrain = build_terrain(config.terrain)
         self.simulation = Simulation(self.terrain.ground, config.kp, config.kd)
         self.episode_steps = round(config.episode_length / CONTROL_DT)
@@ -142,7 +147,7 @@ class LocoEnvironment:
 
     def step(self, action: Float[Array, "n 12"]) -> StepResult:
         """One control step; robots whose episode ends start anew at once. The old state is given up."""
-        self.state, result = self._step(self.simulation.ground, self.state, action)
+        self.state, result = self._step(self.simulation.ground, self.state, action, self.sigma)
         return result
 
     def read_measures(self) -> dict[str, float]:
@@ -227,7 +232,9 @@ class LocoEnvironment:
         noise = jax.random.uniform(jax.random.fold_in(state.key, 1), (self.num_envs, OBSERVATION_SIZE))
         return exact + self.config.randomisation.observation_noise * jnp.asarray(NOISE) * (2 * noise - 1), exact
 
-    def _advance(self, ground: Ground, old: State, action: Float[Array, "n 12"]) -> tuple[State, StepResult]:
+    def _advance(
+        self, ground: Ground, old: State, action: Float[Array, "n 12"], sigma: float
+    ) -> tuple[State, StepResult]:
         c, n = self.config, self.num_envs
         key, draw = jax.random.split(old.key)
         u = jax.random.uniform(draw, (n, 40))
@@ -242,7 +249,7 @@ class LocoEnvironment:
         torque = jnp.where(broken[:, None], 0.0, torque)
 
         motion, touching = self._motion(old, body, contacts, torque, action, broken)
-        terms = reward_terms(motion, c.rewards.sigma)
+        terms = reward_terms(motion, sigma)
         weighted = {k: jnp.nan_to_num(terms[k]) * (w * CONTROL_DT) for k, w in self._weights.items()}
         total = jnp.sum(jnp.stack([value for name, value in weighted.items() if name != "fall"]), 0)
         clipped = total < 0
@@ -342,8 +349,8 @@ class LocoEnvironment:
         values = {
             "steps": jnp.ones(self.num_envs),
             "reward": reward,
-            "linear_tracking": jnp.exp(-linear2 / self.config.rewards.sigma),
-            "yaw_tracking": jnp.exp(-yaw2 / self.config.rewards.sigma),
+            "linear_tracking": jnp.exp(-linear2 / _MEASURE_SIGMA),
+            "yaw_tracking": jnp.exp(-yaw2 / _MEASURE_SIGMA),
             "linear_error2": linear2,
             "yaw_error2": yaw2,
             "metres": moved * ~broken,

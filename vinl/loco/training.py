@@ -107,7 +107,8 @@ def train_locomotor(
         run.create(dump_config(config))
     torch.manual_seed(config.seed)
     torch.backends.cuda.matmul.allow_tf32 = True
-    env = LocoVecEnv(LocoEnvironment(config), device)
+    environment = LocoEnvironment(config)
+    env = LocoVecEnv(environment, device)
     commit = find_commit()
 
     def export(model: MapModel, samples: int) -> None:
@@ -115,7 +116,11 @@ def train_locomotor(
         card = make_card(name or run.path.name, config, actor.describe(), samples, commit)
         save_policy(run.policy, actor, card)
 
-    runner = TrainingRunner(env, rsl_rl_settings(config), run, device, export, describe_figures, save_every)
+    def schedule(algorithm: Any, share: float) -> None:
+        environment.sigma = config.anneal.blend(share, config.rewards.sigma, config.anneal.sigma)
+        algorithm.entropy_coef = config.anneal.blend(share, config.ppo.entropy, config.anneal.entropy)
+
+    runner = TrainingRunner(env, rsl_rl_settings(config), run, device, export, describe_figures, schedule, save_every)
     if resume:
         runner.resume()
     return runner.train(iterations or config.iterations)

@@ -48,6 +48,7 @@ class TrainingRunner(OnPolicyRunner):
         folder: of the run.
         device: torch device.
         export: called after every checkpoint with the samples so far; writes the policy.
+        schedule: called before every iteration with the algorithm and the share of iterations done, to move settings.
         figures: picks what the progress bar shows from an iteration's measures.
         save_every: seconds between checkpoints.
     """
@@ -60,11 +61,13 @@ class TrainingRunner(OnPolicyRunner):
         device: str,
         export: Callable[[Any, int], None],
         figures: Figures,
+        schedule: Callable[[Any, float], None],
         save_every: float = 60.0,
     ) -> None:
         with contextlib.redirect_stdout(io.StringIO()):  # rsl-rl prints its models
             super().__init__(env, copy.deepcopy(settings), None, device)
-        self.folder, self.export, self.figures, self.save_every = folder, export, figures, save_every
+        self.folder, self.export, self.figures = folder, export, figures
+        self.schedule, self.save_every = schedule, save_every
         self.samples = 0
         self._stop = False
 
@@ -118,6 +121,7 @@ class TrainingRunner(OnPolicyRunner):
         with TrainingProgress(iterations, first) as progress, self._interruptible(progress):
             while self.current_learning_iteration < iterations and not self._stop:
                 start = time.perf_counter()
+                self.schedule(self.alg, self.current_learning_iteration / iterations)
                 observation = self._roll_out(observation, steps)
                 collected = time.perf_counter()
                 losses = self.alg.update()

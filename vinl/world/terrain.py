@@ -201,7 +201,7 @@ def build_terrain(config: TerrainConfig) -> Terrain:
                 continue
             none = np.zeros((0, 2))
             if kind == "walls":
-                count = round(difficulty * 0.25 * TILE**2)
+                count = round(difficulty * 0.15 * TILE**2)
                 here = scatter_centres(rng, count, TILE / 2 - 0.3, 1.0, 1.2, none)
                 boxes = [draw_tall(rng, here[::2], long=True), draw_tall(rng, here[1::2], long=False)]
                 # a wall is long: those that would reach into the start are left out
