@@ -63,8 +63,10 @@ def test_count():
         (["policies", "a", "b"], "Unrecognized options: b"),
         (["bench", "nothing"], "there is no benchmark 'nothing'; choose loco or depth"),
         (["bench", "loco", "--num-envs", "-4"], "--num-envs must be positive, got -4"),
-        (["bench", "loco", "--steps", "many"], "Error parsing --steps"),
-        (["bench", "depth", "--size", "0"], "--size must be positive, got 0"),
+        (["bench", "loco", "--seconds", "many"], "Error parsing --seconds"),
+        (["bench", "loco", "--device", "gpu"], "unknown device 'gpu'; use cpu"),
+        (["bench", "loco", "--config", "loco/ruff"], "unknown config 'loco/ruff', did you mean 'loco/rough'"),
+        (["bench", "depth", "--num-images", "0"], "--num-images must be positive, got 0"),
         (["bench", "depth", "--seconds", "nan"], "--seconds must be positive, got nan"),
         (["doctor", "now"], "Unrecognized options: now"),
     ],
@@ -91,6 +93,15 @@ def test_help_of_each(command: str, capsys: pytest.CaptureFixture[str]):
     except SystemExit as end:
         assert not end.code
     assert f"vinl {command}" in capsys.readouterr().out
+
+
+def test_bench_depth_runs(capsys: pytest.CaptureFixture[str]):
+    options = "--num-images 2 --width 8 --height 6 --homes 1 --seconds 0.05 --device cpu".split()
+    assert main(["bench", "depth", "--json", *options]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["images_per_s"] > 0 and figures["num_images"] == 2
+    assert main(["bench", "depth", *options]) == 0
+    assert "images_per_s" in capsys.readouterr().out
 
 
 def plant(monkeypatch: pytest.MonkeyPatch, *rows: tuple) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,8 +21,8 @@ class LocoOptions:
 
     num_envs: int = 4096
     """Robots in parallel."""
-    steps: int = 200
-    """Control steps (20 ms each) to measure, after warming up."""
+    seconds: float = 10.0
+    """How long to measure, after compiling and warming up [s]."""
     config: str = "loco/rough"
     """Name of a shipped config or a YAML file."""
     device: str = "auto"
@@ -34,10 +35,14 @@ class LocoOptions:
 class DepthOptions:
     """Depth images per second over house meshes, and the share of a bare ray kernel's speed."""
 
-    num_envs: int | None = None
-    """Cameras in one launch (default: 4096 on a GPU, 16 on a CPU)."""
-    size: int = 64
-    """Side of the square image [pixels]."""
+    num_images: int | None = None
+    """Images in one launch (default: 4096 on a GPU, 32 on a CPU)."""
+    width: int = 64
+    """Of the images [pixels]."""
+    height: int = 64
+    """Of the images [pixels]."""
+    homes: int = 8
+    """Homes that the images are spread over."""
     seconds: float = 2.0
     """How long to measure [s]."""
     device: str = "auto"
@@ -54,23 +59,50 @@ def main(argv: list[str]) -> int:
         return 0
     if what == "loco":
         options = parse_options(LocoOptions, argv[1:], "bench loco")
-        _refuse(options.num_envs, "--num-envs")
-        _refuse(options.steps, "--steps")
-        from vinl.loco.benchmark import run
-
-        figures = run(options)
+        figures = _bench_loco(options)
     elif what == "depth":
         options = parse_options(DepthOptions, argv[1:], "bench depth")
-        _refuse(options.num_envs, "--num-envs")
-        _refuse(options.size, "--size")
-        _refuse(options.seconds, "--seconds")
-        from vinl.sensing.benchmark import run_depth
-
-        figures = run_depth(options)
+        figures = _bench_depth(options)
     else:
         raise InputError(f"there is no benchmark {what!r}; choose loco or depth")
     _print(figures, what, options.json)
     return 0
+
+
+def _bench_loco(options: LocoOptions) -> dict[str, Any]:
+    _refuse(options.num_envs, "--num-envs")
+    _refuse(options.seconds, "--seconds")
+    device = _device(options.device)
+    os.environ.setdefault("JAX_PLATFORMS", "cpu" if device == "cpu" else "cuda,cpu")
+    from vinl.config.loader import load_config
+    from vinl.loco.benchmark import run_loco
+    from vinl.loco.config import LocoConfig
+
+    return run_loco(options.num_envs, options.seconds, load_config(LocoConfig, options.config))
+
+
+def _bench_depth(options: DepthOptions) -> dict[str, Any]:
+    for option in ("num_images", "width", "height", "homes", "seconds"):
+        _refuse(getattr(options, option), f"--{option.replace('_', '-')}")
+    from vinl.sensing.benchmark import run_depth
+
+    return run_depth(
+        options.num_images,
+        options.width,
+        options.height,
+        _device(options.device),
+        options.seconds,
+        options.homes,
+    )
+
+
+def _device(name: str) -> str:
+    """``auto`` becomes what there is; another device must exist."""
+    import torch
+
+    from vinl.policies.device import choose_device
+
+    return str(choose_device(("cuda" if torch.cuda.is_available() else "cpu") if name == "auto" else name))
 
 
 def _refuse(value: float | None, option: str) -> None:

@@ -1,10 +1,10 @@
-"""How commands read their options: a dataclass, whose field docstrings are the help; wrong options are one line."""
+"""How commands read their options: a dataclass whose field docstrings are the help; wrong options are one line."""
 
 from __future__ import annotations
 
 import contextlib
 import io
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import tyro
 
@@ -14,13 +14,14 @@ T = TypeVar("T")
 _FRAME = " │╰╯─"
 
 
-def parse_options(options: type[T], argv: list[str], command: str) -> T:
+def parse_options(options: type[T] | Any, argv: list[str], command: str, *markers: Any) -> T:
     """Options from the command line; ``--help`` prints them and ends the process.
 
     Args:
-        options: dataclass; its docstring and those of its fields become the help.
+        options: dataclass, or a union of them as subcommands; its docstring and those of its fields become the help.
         argv: arguments after the command.
         command: ``"eval"``, for the usage line.
+        markers: further ``tyro.conf`` settings.
 
     Raises:
         InputError: an option is unknown, missing or of the wrong type; one line, with the option that was meant.
@@ -28,7 +29,7 @@ def parse_options(options: type[T], argv: list[str], command: str) -> T:
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
-            return tyro.cli(options, args=argv, prog=f"vinl {command}", config=(tyro.conf.FlagCreatePairsOff,))
+            return tyro.cli(options, args=argv, prog=f"vinl {command}", config=(tyro.conf.FlagCreatePairsOff, *markers))
     except SystemExit as end:
         if not end.code:
             raise

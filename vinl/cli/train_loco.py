@@ -8,6 +8,7 @@ from typing import Annotated
 
 import tyro
 
+from vinl.cli.options import parse_options
 from vinl.config.errors import InputError
 
 
@@ -46,7 +47,7 @@ STAGES = {1: "loco/rough"}
 
 def main(argv: list[str]) -> int:
     """Run the command; returns 130 after an interrupt."""
-    options = tyro.cli(Options, args=argv, prog="vinl train-loco")
+    options = parse_options(Options, argv, "train-loco")
     if options.stage not in STAGES:
         raise InputError(f"--stage {options.stage} does not exist; choose {', '.join(map(str, STAGES))}")
     if options.save_every <= 0:
