@@ -96,7 +96,8 @@ def test_help_of_each(command: str, capsys: pytest.CaptureFixture[str]):
 
 
 def test_bench_depth_runs(capsys: pytest.CaptureFixture[str]):
-    options = "--num-images 2 --width 8 --height 6 --homes 1 --seconds 0.05 --device cpu".split()
+    small = {"num-images": 2, "width": 8, "height": 6, "homes": 1, "seconds": 0.05, "device": "cpu"}
+    options = [f"--{name}={value}" for name, value in small.items()]
     assert main(["bench", "depth", "--json", *options]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert figures["images_per_s"] > 0 and figures["num_images"] == 2

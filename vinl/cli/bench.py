@@ -75,10 +75,12 @@ def _bench_loco(options: LocoOptions) -> dict[str, Any]:
     device = _device(options.device)
     os.environ.setdefault("JAX_PLATFORMS", "cpu" if device == "cpu" else "cuda,cpu")
     from vinl.config.loader import load_config
-    from vinl.loco.benchmark import run_loco
     from vinl.loco.config import LocoConfig
 
-    return run_loco(options.num_envs, options.seconds, load_config(LocoConfig, options.config))
+    config = load_config(LocoConfig, options.config)
+    from vinl.loco.benchmark import run_loco
+
+    return run_loco(options.num_envs, options.seconds, config)
 
 
 def _bench_depth(options: DepthOptions) -> dict[str, Any]:
