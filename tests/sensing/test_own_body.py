@@ -1,0 +1,48 @@
+"""The robot does not see itself: its body is not in the depth camera's world, so it must not be in the real view."""
+
+import numpy as np
+import pytest
+
+from vinl.robot.aliengo import home_qpos
+from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
+from vinl.sensing.depth import DepthCamera
+from vinl.sensing.robot_shape import RobotShape
+from vinl.world.mesh import join_meshes
+
+POSES, SPREAD = 40, 0.6
+
+
+@pytest.fixture(scope="module")
+def bodies() -> list[tuple[np.ndarray, np.ndarray]]:
+    """The whole robot's surface in the trunk frame: default pose, legs stretched forward, and joints +-0.6 rad."""
+    shape, rng = RobotShape(), np.random.default_rng(0)
+    offsets = rng.uniform(-SPREAD, SPREAD, (POSES, 12))
+    offsets[0] = 0.0
+    offsets[1] = np.tile([0.0, -SPREAD, SPREAD], 4)  # feet far forward and up, as in a long step
+    offsets[2] = np.tile([0.0, -SPREAD, 0.0], 4)
+    found = []
+    for offset in offsets:
+        qpos = home_qpos()
+        qpos[:3], qpos[7:] = 0.0, qpos[7:] + offset
+        positions, rotations = shape.place(qpos)
+        frames = [shape.names.index(body.body) for body in shape.bodies]
+        parts = [
+            (body.vertices @ rotations[k].T + positions[k], body.faces)
+            for body, k in zip(shape.bodies, frames, strict=True)
+        ]
+        found.append(join_meshes(*parts))
+    return found
+
+
+@pytest.mark.parametrize("camera", [LOCOMOTION_CAMERA, NAVIGATION_CAMERA], ids=lambda c: c.name)
+def test_no_part_of_the_robot_is_in_view(camera, bodies):
+    n = len(bodies)
+    depth = DepthCamera(bodies, camera).render(np.arange(n), np.zeros((n, 3)), np.repeat(np.eye(3)[None], n, 0))
+    assert (depth == camera.far).all()
+
+
+def test_the_test_would_notice(bodies):
+    """From a mount 0.1 m farther back the camera sits in the trunk and sees its shell."""
+    inside = DepthCamera(bodies[:1], LOCOMOTION_CAMERA)
+    depth = inside.render([0], [[-0.1, 0.0, 0.0]], np.eye(3)[None])
+    assert (depth < LOCOMOTION_CAMERA.far).any()
