@@ -20,6 +20,9 @@ DEFAULT_RESOLUTION = 0.05
 DARK = 128
 """Grey values below this are walls."""
 
+LEAST_FLOOR = 4.0
+"""A map whose walls enclose less known floor than this [m2] has no outer walls to speak of."""
+
 MAX_PIXELS = 50_000_000
 
 
@@ -119,10 +122,9 @@ def build_from_pixels(
     if known is not None:
         floor = _look_up(known[::-1], frame, resolution, origin)
         inside &= floor
-        if inside.sum() < 0.3 * floor.sum():
-            # much of the floor borders on the unknown and not on walls, so the unknown stands for the missing walls
-            fenced = find_inside(solid | ~floor, RESOLUTION) & floor
-            inside = fenced if fenced.sum() > inside.sum() else inside
+        if inside.sum() * RESOLUTION**2 < LEAST_FLOOR:
+            # the floor borders on the unknown where walls are missing, so the unknown stands for them
+            inside = find_inside(solid | ~floor, RESOLUTION) & floor
     # every second ROS map is called map.yaml: the folder tells them apart
     name = file.absolute().parent.name if file.stem == "map" else file.stem
     return assemble_floorplan(name, str(file), boxes, Boxes.empty(), inside, frame)
