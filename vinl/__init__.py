@@ -11,12 +11,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from vinl.config.errors import InputError as InputError
     from vinl.config.loader import load_config as load_config
+    from vinl.evaluation.evaluate import evaluate as evaluate
     from vinl.policies.card import PolicyCard as PolicyCard
     from vinl.policies.io import list_policies as list_policies
     from vinl.policies.io import load_policy as load_policy
     from vinl.policies.io import save_policy as save_policy
     from vinl.world.blocks import Blocks as Blocks
     from vinl.world.boxes import Boxes as Boxes
+    from vinl.world.floorplan import FloorPlan as FloorPlan
+    from vinl.world.readers import load_floorplan as load_floorplan
+    from vinl.world.readers import shipped_floorplans as shipped_floorplans
 
 _WHERE = {
     "Blocks": "vinl.world.blocks",
@@ -24,6 +28,7 @@ _WHERE = {
     "FloorPlan": "vinl.world.floorplan",
     "InputError": "vinl.config.errors",
     "PolicyCard": "vinl.policies.card",
+    "evaluate": "vinl.evaluation.evaluate",
     "list_policies": "vinl.policies.io",
     "load_config": "vinl.config.loader",
     "load_floorplan": "vinl.world.readers",

@@ -67,9 +67,11 @@ def describe_action() -> dict[str, Any]:
     return {"scale": ACTION_SCALE, "default_pose": DEFAULT_POSE.tolist(), "kp": KP, "kd": KD}
 
 
-def locomotion_card(name: str, network: dict[str, Any], **rest: Any) -> PolicyCard:
-    """A locomotion card with this robot's observation table and action; ``rest`` are further fields."""
-    return PolicyCard("locomotion", name, network, describe(), describe_action(), **rest)
+def locomotion_card(
+    name: str, network: dict[str, Any], action: dict[str, Any] | None = None, **rest: Any
+) -> PolicyCard:
+    """A locomotion card with this robot's observation table and, unless given, action; ``rest`` are further fields."""
+    return PolicyCard("locomotion", name, network, describe(), action or describe_action(), **rest)
 
 
 def write_card(folder: Path, card: PolicyCard) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 import torch
@@ -15,6 +15,7 @@ from vinl.policies.networks import PolicyNetwork
 A = TypeVar("A", np.ndarray, Tensor)
 
 
+@runtime_checkable
 class Policy(Protocol):
     """Batched: one call acts for all robots. Recurrent state, if any, lives inside."""
 
