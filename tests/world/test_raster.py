@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from skimage.measure import label
 
+from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.raster import drop_specks, paint_boxes, split_rectangles
@@ -19,6 +20,11 @@ def test_rectangles_cover_exactly_the_mask(mask):
         assert mask[r0:r1, c0:c1].all()
         covered[r0:r1, c0:c1] = True
     assert (covered == mask).all()
+
+
+def test_noise_is_not_made_into_boxes():
+    with pytest.raises(InputError, match="min-speck"):
+        split_rectangles(np.indices((40, 40)).sum(0) % 2 == 0, limit=100)
 
 
 def test_walls_become_few_rectangles():

@@ -40,6 +40,11 @@ def test_occupied_is_wall_and_unknown_is_not_free(tmp_path):
     assert plan.walls.rows[:, 6].max() == 2.5
 
 
+def test_grey_205_is_unknown_whatever_the_threshold(tmp_path):
+    area = load_floorplan(save_map(tmp_path)).area_m2
+    assert load_floorplan(save_map(tmp_path, text=HEAD.replace("0.196", "0.25"))).area_m2 == pytest.approx(area)
+
+
 def test_yaw_of_the_origin_turns_the_map(tmp_path):
     straight = load_floorplan(save_map(tmp_path))
     turned = load_floorplan(save_map(tmp_path, text=HEAD.replace("0.0]", "0.5]"), name="turned"))

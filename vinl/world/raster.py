@@ -6,11 +6,12 @@ import numpy as np
 from jaxtyping import Bool, Int
 from skimage.measure import label
 
+from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 
 
-def split_rectangles(mask: Bool[np.ndarray, "rows columns"]) -> Int[np.ndarray, "n 4"]:
+def split_rectangles(mask: Bool[np.ndarray, "rows columns"], limit: int = 20_000) -> Int[np.ndarray, "n 4"]:
     """Few rectangles that together cover exactly the true cells of the mask.
 
     Greedy: the first cell not yet covered (row by row) grows into the larger of two rectangles, widest first or
@@ -18,6 +19,9 @@ def split_rectangles(mask: Bool[np.ndarray, "rows columns"]) -> Int[np.ndarray, 
 
     Returns:
         One rectangle a row: first row, first column, one past the last row, one past the last column.
+
+    Raises:
+        InputError: if more than ``limit`` rectangles are needed: such a mask is noise, and no simulator takes it.
     """
     todo = mask.copy()
     rectangles = []
@@ -31,6 +35,8 @@ def split_rectangles(mask: Bool[np.ndarray, "rows columns"]) -> Int[np.ndarray, 
             grown[1] = (grown[1][1], grown[1][0], grown[1][3], grown[1][2])
             best = max(grown, key=lambda q: int(todo[q[0] : q[2], q[1] : q[3]].sum()))
             rectangles.append(best)
+            if len(rectangles) > limit:
+                raise InputError(f"the walls fall into more than {limit} boxes; drop noise with --min-speck")
             todo[best[0] : best[2], best[1] : best[3]] = False
     return np.array(rectangles, dtype=np.int64).reshape(-1, 4)
 

@@ -111,7 +111,10 @@ def build_from_pixels(
     size = np.array(walls.shape[::-1]) * resolution
     edges = np.array([[0, 0], [size[0], 0], [0, size[1]], [size[0], size[1]]]) @ np.array([[c, s], [-s, c]]) + [x, y]
     frame = frame_around(edges.min(0), edges.max(0), str(file))
-    first_row, first_column, last_row, last_column = split_rectangles(walls).T * resolution
+    try:
+        first_row, first_column, last_row, last_column = split_rectangles(walls).T * resolution
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
     u, v = (first_column + last_column) / 2, (first_row + last_row) / 2
     n = np.ones(len(u))
     rows = [x + c * u - s * v, y + s * u + c * v, n * yaw]

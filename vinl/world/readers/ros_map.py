@@ -15,13 +15,16 @@ from vinl.world.readers.image import build_from_pixels, read_pixels
 OCCUPIED, FREE = 0.65, 0.196
 """Thresholds of maps that do not state their own [map_server]."""
 
+UNKNOWN = 205
+"""Grey value of what the robot that made the map never saw [map_server]."""
+
 
 def read_ros_map(file: Path, min_speck: int, wall_height: float) -> FloorPlan:
     """Read a map: occupied pixels are walls, free ones are floor, unknown ones are neither.
 
     Taken from the file: ``image`` (relative to the file), ``resolution``, ``origin`` with its yaw, ``negate``,
     ``occupied_thresh``, ``free_thresh``, ``mode`` (``raw`` reads pixels as 0-100 and 255; the others share a meaning
-    here). Transparent pixels are unknown.
+    here). Grey 205 and transparent pixels are unknown.
 
     Raises:
         InputError: if the YAML or its picture is missing or broken, or encloses no floor.
@@ -45,14 +48,15 @@ def read_ros_map(file: Path, min_speck: int, wall_height: float) -> FloorPlan:
         chance = np.where(grey > 100, 0.5 * (free + occupied), grey / 100.0)
     else:
         chance = grey / 255.0 if _read_number(file, entries, "negate", 0) else (255 - grey.astype(float)) / 255.0
+        # map savers write 205 for unknown, which the free_thresh that some of them state (0.25) would call free
+        chance = np.where(grey == UNKNOWN, np.clip(chance, free, occupied), chance)
     walls = (chance > occupied) & (alpha >= 128)
     known = (chance < free) & (alpha >= 128)
     if not walls.any():
         raise InputError(f"{picture}: the map has no occupied pixel; check negate and occupied_thresh in {file.name}")
     if not known.any():
         raise InputError(f"{picture}: the map has no free pixel; check negate and free_thresh in {file.name}")
-    plan = build_from_pixels(file, walls, known, resolution, min_speck, wall_height, _read_origin(file, entries))
-    return plan
+    return build_from_pixels(file, walls, known, resolution, min_speck, wall_height, _read_origin(file, entries))
 
 
 def _read_entries(file: Path) -> dict[str, Any]:
