@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -25,6 +25,7 @@ class Task:
     route: StartGoal
 
 
+@runtime_checkable
 class Navigator(Protocol):
     """Drives all robots of one unit of work in lockstep.
 

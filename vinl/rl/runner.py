@@ -9,7 +9,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from types import FrameType
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import torch
 from rsl_rl.env import VecEnv
@@ -23,6 +23,7 @@ from vinl.rl.run_folder import RunFolder
 Figures = Callable[[dict[str, float]], dict[str, str]]
 
 
+@runtime_checkable
 class TrainingEnv(Protocol):
     """What the loop needs of an environment beside rsl-rl's ``VecEnv``."""
 
