@@ -112,6 +112,7 @@ def test_bad_pictures_are_explained(tmp_path):
     fails("black.png", "whole picture is wall", lambda p: save_grey(p, np.ones((50, 50), bool)))
     fails("opaque.pgm", "whole picture is wall", lambda p: save_grey(p, np.ones((50, 50), bool)))
     fails("small.png", "too small for the robot", lambda p: save_alpha(p, home), resolution=0.005)
+    fails("inverted.png", "invert the picture", lambda p: save_grey(p, ~home), resolution=0.1)
     fails("line.png", "no floor is enclosed", lambda p: save_alpha(p, np.eye(60, dtype=bool)), resolution=0.1)
     fails("a.png", "resolution", lambda p: save_alpha(p, home), resolution=-1.0)
     fails("b.png", "resolution", lambda p: save_alpha(p, home), resolution=500.0)

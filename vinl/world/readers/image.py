@@ -54,9 +54,16 @@ def read_image_plan(file: Path, resolution: float | None, min_speck: int, wall_h
         raise InputError(f"{file}: the picture is empty: it has no {rule} pixels, which would be the walls")
     if walls.all():
         raise InputError(f"{file}: the whole picture is wall: all its pixels are {rule}; floor is light or transparent")
-    return build_from_pixels(
-        file, walls, None, DEFAULT_RESOLUTION if resolution is None else resolution, min_speck, wall_height
-    )
+    scale = DEFAULT_RESOLUTION if resolution is None else resolution
+    try:
+        return build_from_pixels(file, walls, None, scale, min_speck, wall_height)
+    except InputError as error:
+        if walls.mean() < 0.5:
+            raise
+        raise InputError(
+            f"{file}: {walls.mean():.0%} of the picture is {rule}, which means wall, and leaves the robot no floor; "
+            "invert the picture if walls and floor are exchanged"
+        ) from error
 
 
 def read_pixels(file: Path) -> tuple[UInt8[np.ndarray, "rows columns"], UInt8[np.ndarray, "rows columns"]]:
