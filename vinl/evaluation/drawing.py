@@ -72,7 +72,7 @@ def draw_map(plan: FloorPlan, episodes: Sequence[Episode], first: int, radius: f
     half = plan.frame.resolution / 2
     width, height = high - low
     parts = [
-        f'<svg class="map" viewBox="{low[0]:.2f} {-high[1]:.2f} {width:.2f} {height:.2f}" role="img" '
+        f'<svg class="map" viewBox="{low[0]:.2f} {-high[1]:.2f} {width:.2f} {height + 0.45:.2f}" role="img" '
         f'style="--w:{width / height:.3f}">',
         f'<image href="{draw_floor(plan.inside)}" x="{x[0] - half:.3f}" y="{-y[-1] - half:.3f}" '
         f'width="{x[-1] - x[0] + 2 * half:.3f}" height="{y[-1] - y[0] + 2 * half:.3f}" preserveAspectRatio="none"/>',
@@ -98,7 +98,7 @@ def draw_map(plan: FloorPlan, episodes: Sequence[Episode], first: int, radius: f
             f'<text x="{gx:.2f}" y="{-gy + 0.11:.2f}">{record.episode}</text></g>'
         )
     bar = 1 if width < 15 else 5
-    bx, by = low[0] + 0.15, -low[1] - 0.12
+    bx, by = low[0] + 0.4, -low[1] + 0.15
     parts.append(
         f'<g class="scale"><path d="M{bx:.2f} {by:.2f}h{bar}"/>'
         f'<text x="{bx + bar + 0.1:.2f}" y="{by + 0.1:.2f}">{bar} m</text></g></svg>'
@@ -120,9 +120,9 @@ def draw_histogram(values: Sequence[float], title: str, low: float = 0.0, high: 
     peak = max(int(counts.max()), 1)
     w, h, base = 300, 150, 118
     bars = "".join(
-        f'<rect x="{14 + k * 13.6:.1f}" y="{base - 84 * c / peak:.1f}" width="12.2" height="{84 * c / peak:.1f}" rx="1.5"/>'
+        f'<rect x="{14 + k * 13.6:.1f}" y="{base - tall:.1f}" width="12.2" height="{tall:.1f}" rx="1.5"/>'
         for k, c in enumerate(counts)
-        if c
+        if (tall := 84 * c / peak)
     )
     mean = ""
     if len(v):
@@ -138,7 +138,8 @@ def draw_histogram(values: Sequence[float], title: str, low: float = 0.0, high: 
     )
     return (
         f'<svg class="histogram" viewBox="0 0 {w} {h}" role="img"><title>{title}</title>'
-        f'<text class="title" x="14" y="12">{title}</text>{bars}<path class="axis" d="M14 {base}H286"/>{mean}{ticks}</svg>'
+        f'<text class="title" x="14" y="12">{title}</text>{bars}'
+        f'<path class="axis" d="M14 {base}H286"/>{mean}{ticks}</svg>'
     )
 
 

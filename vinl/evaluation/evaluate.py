@@ -111,7 +111,9 @@ def evaluate(
         units = crew.run(run_job, jobs, _counter(on_progress, "walk", len(jobs) * episodes))
         if films != "none":
             assert out is not None
-            shots = [FilmJob(job.plan, unit[k], str(out)) for job, unit in zip(jobs, units, strict=True) for k in job.filmed]
+            shots = [
+                FilmJob(job.plan, unit[k], str(out)) for job, unit in zip(jobs, units, strict=True) for k in job.filmed
+            ]
             videos = crew.run(film_job, shots, _counter(on_progress, "film", len(shots)))
     done = [episode for unit in units for episode in unit]
     wall = time.perf_counter() - began

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,10 +14,16 @@ from vinl.evaluation.config import OracleConfig
 from vinl.evaluation.navigator import Task
 from vinl.robot.cameras import Camera
 from vinl.world.free_space import FreeSpace
-from vinl.world.geodesic import comfortable_path
+from vinl.world.geodesic import comfortable_path, path_length
 
 _ROOM = 0.6
 """Clearance that the planned way seeks [m]: half the robot's length and some sway."""
+
+_SQUEEZE = 0.32
+"""Less clearance than this [m] is a squeeze: half the robot's width, the swing of its legs and some sway."""
+
+_DETOUR = 1.5
+"""A way around a squeeze may be so many times longer."""
 
 
 class OracleNavigator:
@@ -75,9 +82,19 @@ class OracleNavigator:
         return first + int(np.linalg.norm(window - xy, axis=1).argmin())
 
 
-def plan_way(
-    space: FreeSpace, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]
-) -> Float[np.ndarray, "k 2"]:
-    """A way that goes through the middle of doors; its points are at most 0.1 m apart, its last is the goal."""
-    way = comfortable_path(space.traversable, space.clearance, space.plan.frame, start, goal, room=_ROOM)
+def plan_way(space: FreeSpace, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]) -> Float[np.ndarray, "k 2"]:
+    """A way that goes through the middle of doors; its points are at most 0.1 m apart, its last is the goal.
+
+    Gaps that the robot would only squeeze through are avoided where the way around is not much longer.
+
+    Raises:
+        InputError: if the goal cannot be reached from the start.
+    """
+    frame = space.plan.frame
+    way = comfortable_path(space.traversable, space.clearance, frame, start, goal, room=_ROOM)
+    cell = frame.cell(way)
+    if space.clearance[cell[:, 0], cell[:, 1]].min() < _SQUEEZE:
+        with contextlib.suppress(InputError):  # there may be no way around, or the robot stands in a gap
+            roomy = comfortable_path(space.clearance >= _SQUEEZE, space.clearance, frame, start, goal, room=_ROOM)
+            way = roomy if path_length(roomy) <= _DETOUR * path_length(way) else way
     return np.vstack([way, np.asarray(goal, dtype=np.float64)])

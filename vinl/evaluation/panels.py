@@ -22,7 +22,14 @@ _SIDE, _EYE, _BAR = 480, (236, 142), 80
 _INK, _PAPER, _MUTED = (230, 232, 235), (24, 26, 30), (150, 155, 163)
 _FLOOR, _WALL, _FURNITURE, _BLOCK = (52, 56, 64), (205, 208, 214), (112, 120, 132), (214, 126, 68)
 _PATH, _START, _GOAL, _ROBOT = (96, 165, 250), (250, 204, 21), (74, 222, 128), (255, 255, 255)
-_TOUCH = {0: (248, 113, 113), 1: (232, 121, 249), 2: (251, 191, 36), 3: (251, 191, 36), 4: (244, 63, 94), 5: (244, 63, 94)}
+_TOUCH = {
+    0: (248, 113, 113),
+    1: (232, 121, 249),
+    2: (251, 191, 36),
+    3: (251, 191, 36),
+    4: (244, 63, 94),
+    5: (244, 63, 94),
+}
 
 
 @cache
@@ -104,7 +111,7 @@ def compose(
 ) -> UInt8[np.ndarray, "720 1280 3"]:
     """One picture of the film: robot left, what locomotion and navigation camera see and the map right."""
     frame = Image.new("RGB", SIZE, _PAPER)
-    frame.paste(Image.fromarray(robot).resize((SIZE[0] - _SIDE, SIZE[1] - _BAR)), (0, 0))
+    frame.paste(Image.fromarray(robot).resize((SIZE[0] - _SIDE, SIZE[1] - _BAR), Image.Resampling.LANCZOS), (0, 0))
     pen = ImageDraw.Draw(frame)
     left = SIZE[0] - _SIDE
     for k, (eye, title) in enumerate(zip(eyes, ("locomotion camera", "navigation camera"), strict=True)):

@@ -28,9 +28,7 @@ class Interrupted(Exception):
     """The roll-out was asked to stop."""
 
 
-def goal_in_heading_frame(
-    pose: Float[np.ndarray, "n 3"], goal: Float[np.ndarray, "n 2"]
-) -> Float[np.ndarray, "n 3"]:
+def goal_in_heading_frame(pose: Float[np.ndarray, "n 3"], goal: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
     """Straight distance to the goal [m], cosine and sine of its bearing, left positive [facts/locomotion 6.5]."""
     to = goal - pose[:, :2]
     bearing = np.arctan2(to[:, 1], to[:, 0]) - pose[:, 2]

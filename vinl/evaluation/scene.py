@@ -21,6 +21,10 @@ FORCE_SENSORS = tuple(f"force_{foot}" for foot in FOOT_GEOMS)
 
 _FOUND, _FORCE = (1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND)), (1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE))
 _ANY, _NET_FORCE = 0, 3
+_SOLID = {
+    "contype": 1,
+    "conaffinity": 0,
+}  # the robot's geoms have it the other way round, so that they never touch each other
 
 
 def build_scene(
@@ -49,8 +53,7 @@ def build_scene(
                 pos=[x, y, (bottom + top) / 2],
                 size=[length / 2, width / 2, (top - bottom) / 2],
                 quat=[np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)],
-                contype=0,
-                conaffinity=1,
+                **_SOLID,
             )
     kind = mujoco.mjtObj
     for sensor, first, name, second, other in (
@@ -78,7 +81,7 @@ def _add_contact_sensor(spec: mujoco.MjSpec, name: str, first, a: str, second, b
 
 def _add_ground(spec: mujoco.MjSpec, ground: HeightField | None) -> None:
     if ground is None:
-        spec.worldbody.add_geom(name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1])
+        spec.worldbody.add_geom(name=GROUND, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], **_SOLID)
         return
     rows, columns = ground.frame.shape
     low, high = float(ground.heights.min()), float(ground.heights.max())
@@ -95,5 +98,6 @@ def _add_ground(spec: mujoco.MjSpec, ground: HeightField | None) -> None:
         name=GROUND,
         type=mujoco.mjtGeom.mjGEOM_HFIELD,
         hfieldname=GROUND,
+        **_SOLID,
         pos=[ground.frame.x0 + half[0], ground.frame.y0 + half[1], low],
     )

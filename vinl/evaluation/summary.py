@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
@@ -12,18 +13,20 @@ from vinl.evaluation.metrics import aggregate_episodes
 from vinl.evaluation.records import Results
 
 _COLUMNS = (
-    ("success", "success %", 100, 1),
+    ("success", "success", 100, 1),
     ("spl", "SPL", 1, 3),
-    ("distance_m", "distance m", 1, 2),
-    ("time_s", "time s", 1, 1),
-    ("foot_collisions_per_m", "foot coll. /m", 1, 2),
-    ("leg_contacts_per_m", "leg cont. /m", 1, 2),
+    ("distance_m", "metres", 1, 2),
+    ("time_s", "s", 1, 1),
+    ("foot_collisions_per_m", "foot/m", 1, 2),
+    ("leg_contacts_per_m", "leg/m", 1, 2),
 )
 
 
 def print_summary(console: Console, results: Results, out: Path) -> None:
     """One row a plan, one for all, and where the files lie."""
-    table = Table("plan", *[title for _, title, _, _ in _COLUMNS], "falls", "episodes")
+    table = Table("plan", box=box.SIMPLE_HEAD, pad_edge=False)
+    for title in (*[title for _, title, _, _ in _COLUMNS], "falls", "n"):
+        table.add_column(title, justify="right", no_wrap=True)
     min_metres = results.config["evaluation"]["min_metres"]
     for plan in results.plans:
         records = [r for r in results.records if r.plan == plan.name]
@@ -31,7 +34,11 @@ def print_summary(console: Console, results: Results, out: Path) -> None:
     table.add_section()
     table.add_row("all", *_cells(results.aggregate), style="bold")
     console.print(table)
-    console.print(f"{results.wall_seconds:.0f} s; report {out / 'report.html'}; figures {out / 'results.json'}", soft_wrap=True)
+    success, rate = results.aggregate["success"], results.aggregate["foot_collisions_per_m"]
+    console.print(f"success {_interval(success, 100, 1)} %, foot collisions {_interval(rate, 1, 2)} per metre")
+    console.print(
+        f"{results.wall_seconds:.0f} s; report {out / 'report.html'}; figures {out / 'results.json'}", soft_wrap=True
+    )
     for name in results.videos:
         console.print(f"film {out / name}", soft_wrap=True)
 
@@ -39,7 +46,17 @@ def print_summary(console: Console, results: Results, out: Path) -> None:
 def _cells(aggregate: dict[str, Any]) -> list[str]:
     cells = []
     for key, _, factor, digits in _COLUMNS:
-        mean, std = aggregate[key]["mean"], aggregate[key]["std_over_seeds"]
-        cells.append("-" if mean is None else f"{factor * mean:.{digits}f} ± {factor * std:.{digits}f}")
+        mean = aggregate[key]["mean"]
+        cells.append("-" if mean is None else f"{factor * mean:.{digits}f}{' %' if factor == 100 else ''}")
     falls = "-" if aggregate["falls"] is None else f"{100 * aggregate['falls']:.1f} %"
     return [*cells, falls, str(aggregate["episodes"])]
+
+
+def _interval(figure: dict[str, Any], factor: int, digits: int) -> str:
+    if figure["mean"] is None:
+        return "-"
+    mean, std, (low, high) = figure["mean"], figure["std_over_seeds"], figure["ci95"]
+    return (
+        f"{factor * mean:.{digits}f} ± {factor * std:.{digits}f} over seeds "
+        f"(95 %: {factor * low:.{digits}f} to {factor * high:.{digits}f})"
+    )
