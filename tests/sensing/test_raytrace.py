@@ -42,7 +42,7 @@ def test_sky_floor_and_box_are_where_they_belong():
 
 
 def test_robot_is_drawn_where_it_stands_and_throws_a_shadow(shape):
-    scene = plain_scene(Boxes.empty(), [], FRAME, checker=0.0)
+    scene = plain_scene(Boxes.empty(), [], FRAME)
     renderer = RayRenderer(scene, shape.bodies, shape.names)
     view = look_at((0.0, 0.0, 3.0), (0.001, 0.0, 0.0))
     empty = renderer.render(view, 96, 96)
@@ -84,8 +84,8 @@ def test_homes_are_cut_low_and_keep_their_colours():
     plan = SimpleNamespace(walls=walls, furniture=furniture, frame=FRAME)
     scene = plan_scene(plan, Blocks(np.array([[1, 1, 0, 0.3, 0.2, 0.15]])), goal=(2.0, 1.0))
     assert scene.vertices[:, 2].max() <= 1.0
-    # A wall, one piece of furniture (the other hangs above the cut), a block, the goal, the floor.
-    assert len(scene.faces) == len(scene.colours) == len(scene.checker) == 4 * 12 + 2
+    # A wall, one piece of furniture (the other hangs above the cut), a block, the goal (and one hidden face).
+    assert len(scene.faces) == len(scene.colours) == 4 * 12 + 1
     assert np.allclose(scene.colours[24], BLOCK) and np.allclose(scene.colours[36], GOAL)
 
 

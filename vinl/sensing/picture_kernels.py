@@ -35,7 +35,10 @@ def near_sphere(origin: wp.vec3, direction: wp.vec3, centre: wp.vec3, radius: fl
 def render_picture(
     world: wp.uint64,
     face_colour: wp.array(dtype=wp.vec3),
-    face_checker: wp.array(dtype=float),
+    floor_low: wp.vec2,
+    floor_high: wp.vec2,
+    floor_colour: wp.vec3,
+    checker: float,
     body_mesh: wp.array(dtype=wp.uint64),
     body_frame: wp.array(dtype=int),
     body_colour: wp.array(dtype=wp.vec3),
@@ -69,17 +72,23 @@ def render_picture(
         colour = sky(ray)
         normal = wp.vec3(0.0, 0.0, 0.0)
         gloss = wp.float32(0.0)
-        static = wp.mesh_query_ray(world, eye, ray, far)
+        # The floor is a plane and not two triangles: what it hides need not be searched for in the mesh.
+        if ray[2] < 0.0 and eye[2] > 0.0:
+            below = -eye[2] / ray[2]
+            p = eye + ray * below
+            inside = p[0] >= floor_low[0] and p[0] <= floor_high[0] and p[1] >= floor_low[1] and p[1] <= floor_high[1]
+            if inside and below < far:
+                t = below
+                normal = wp.vec3(0.0, 0.0, 1.0)
+                colour = floor_colour
+                odd = (int(wp.floor(p[0] / checker)) + int(wp.floor(p[1] / checker))) % 2 != 0
+                if odd:
+                    colour = colour * 0.88
+        static = wp.mesh_query_ray(world, eye, ray, t)
         if static.result:
             t = static.t
             normal = static.normal
             colour = face_colour[static.face]
-            side = face_checker[static.face]
-            if side > 0.0:
-                # A touch away from the floor's own plane, or its cells would flicker.
-                p = eye + ray * t
-                if (int(wp.floor(p[0] / side)) + int(wp.floor(p[1] / side))) % 2 != 0:
-                    colour = colour * 0.88
         if near_sphere(eye, ray, robot_centre, robot_radius, t):
             for body in range(body_mesh.shape[0]):
                 frame = body_frame[body]

@@ -57,7 +57,9 @@ class RayRenderer:
         self.names = tuple(dict.fromkeys(body.body for body in bodies)) if names is None else tuple(names)
         self._world = build_mesh(scene.vertices, scene.faces, "cpu")
         self._colours = wp.array(scene.colours, dtype=wp.vec3, device="cpu")
-        self._checker = wp.array(scene.checker, dtype=float, device="cpu")
+        edge = np.array([[-0.5, -0.5], np.array(scene.floor.shape[::-1]) - 0.5]) * scene.floor.resolution
+        low, high = edge + np.array([scene.floor.x0, scene.floor.y0])
+        self._floor = [wp.vec2(*low), wp.vec2(*high), wp.vec3(*scene.floor_colour), scene.checker]
         self._meshes = [build_mesh(body.vertices, body.faces, "cpu") for body in bodies]
         centres = [(body.vertices.min(0) + body.vertices.max(0)) / 2 for body in bodies]
         radii = [np.linalg.norm(b.vertices - c, axis=1).max() for b, c in zip(bodies, centres, strict=True)]
@@ -120,7 +122,7 @@ class RayRenderer:
             inputs=[
                 self._world.id,
                 self._colours,
-                self._checker,
+                *self._floor,
                 *body_inputs,
                 wp.array(np.ascontiguousarray(positions, np.float32), dtype=wp.vec3, device="cpu"),
                 wp.array(np.ascontiguousarray(rotations, np.float32), dtype=wp.mat33, device="cpu"),

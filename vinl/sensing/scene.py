@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
-from vinl.world.mesh import TRIANGLES_PER_BOX, box_mesh, floor_mesh, join_meshes
+from vinl.world.mesh import TRIANGLES_PER_BOX, box_mesh, join_meshes
 
 Colour = tuple[float, float, float]
 """Red, green, blue, 0 to 1."""
@@ -51,13 +51,17 @@ class Scene:
         vertices: (v, 3) [m].
         faces: (f, 3).
         colours: (f, 3) red, green, blue of every face, 0 to 1.
-        checker: (f,) side of the squares drawn on a face [m], seen from above; 0 for none.
+        floor: the grid that the floor z = 0 covers.
+        floor_colour: its colour.
+        checker: side of the squares drawn on it [m].
     """
 
     vertices: Float[np.ndarray, "v 3"]
     faces: Int[np.ndarray, "f 3"]
     colours: Float[np.ndarray, "f 3"]
-    checker: Float[np.ndarray, " f"]
+    floor: GridFrame
+    floor_colour: Colour = FLOOR
+    checker: float = 0.5
 
 
 def plain_scene(
@@ -70,13 +74,13 @@ def plain_scene(
         colours: one for each box.
         frame: the floor covers this grid.
         floor: its colour.
-        checker: side of its squares [m].
+        checker: side of its squares [m], positive.
     """
-    vertices, faces = join_meshes(box_mesh(boxes), floor_mesh(frame))
-    painted = np.repeat(np.array([*colours, floor]), [*[TRIANGLES_PER_BOX] * len(boxes), 2], axis=0)
-    sides = np.zeros(len(faces))
-    sides[-2:] = checker
-    return Scene(vertices, faces, painted.astype(np.float32), sides.astype(np.float32))
+    # A mesh needs a face; the one below the floor is never seen.
+    hidden = np.array([[0, 0, -2], [0.1, 0, -2], [0, 0.1, -2]]), np.array([[0, 1, 2]])
+    vertices, faces = join_meshes(box_mesh(boxes), hidden)
+    painted = np.repeat(np.array([*colours, floor]), [*[TRIANGLES_PER_BOX] * len(boxes), 1], axis=0)
+    return Scene(vertices, faces, painted.astype(np.float32), frame, floor, checker)
 
 
 def plan_scene(
@@ -101,8 +105,10 @@ def plan_scene(
         (plan.furniture, furniture_height, FURNITURE),
     ):
         cut = boxes.rows[boxes.rows[:, 5] < height - 0.02].copy()
-        # Boxes that overlap must not be cut in one plane: their colours would mix in a speckle.
-        cut[:, 6] = np.minimum(cut[:, 6], height - 0.0007 * (np.arange(len(cut)) % 7))
+        # Boxes that overlap must not share a plane: their colours would mix in a speckle.
+        shift = 0.0007 * (np.arange(len(cut)) % 7)
+        cut[:, 6] = np.maximum(np.minimum(cut[:, 6], height) - shift, cut[:, 5] + 0.001)
+        cut[:, 3:5] = np.maximum(cut[:, 3:5] - shift[:, None], 0.001)
         parts.append(cut)
         colours += [palette[k % len(palette)] for k in range(len(cut))]
     if blocks is not None:
