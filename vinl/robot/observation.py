@@ -58,7 +58,9 @@ CLIP = 100.0
 
 
 def _per_number(values: list[tuple[float, ...]]) -> np.ndarray:
-    return np.concatenate([np.broadcast_to(v, term.size) for v, term in zip(values, TABLE, strict=True)]).astype(np.float32)
+    return np.concatenate([np.broadcast_to(v, term.size) for v, term in zip(values, TABLE, strict=True)]).astype(
+        np.float32
+    )
 
 
 SCALE = _per_number([term.scale for term in TABLE])
@@ -100,6 +102,4 @@ def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, g
 
 def describe() -> list[dict[str, Any]]:
     """The table as plain data, for policy cards and the docs."""
-    return [
-        {"name": t.name, "size": t.size, "scale": list(t.scale), "noise": t.noise, "unit": t.unit} for t in TABLE
-    ]
+    return [{"name": t.name, "size": t.size, "scale": list(t.scale), "noise": t.noise, "unit": t.unit} for t in TABLE]
