@@ -24,7 +24,7 @@ from vinl.world.floorplan import FloorPlan
 from vinl.world.free_space import FreeSpace
 
 
-class Interrupted(Exception):
+class InterruptedRunError(Exception):
     """The roll-out was asked to stop."""
 
 
@@ -61,7 +61,7 @@ def run_episodes(
         is_stopped: asked before each decision of the navigator.
 
     Raises:
-        Interrupted: ``is_stopped`` said so.
+        InterruptedRunError: ``is_stopped`` said so.
     """
     n, space = len(setups), FreeSpace(plan)
     locomotor.reset(n)
@@ -77,7 +77,7 @@ def run_episodes(
     for step in range(limit):
         if step % config.navigation_period == 0:
             if is_stopped():
-                raise Interrupted
+                raise InterruptedRunError
             pose = np.column_stack([qpos[:, :2], yaw_of(np, qpos[:, 3:7])])
             choice = navigator.act(
                 {"goal": goal_in_heading_frame(pose, goals), "previous_action": choice, "pose": pose}
@@ -110,15 +110,15 @@ def run_episodes(
 
 
 def _spawn_walkers(plan: FloorPlan, setups: Sequence[EpisodeSetup], locomotor: Policy) -> list[Walker]:
-    gains = {key: float(locomotor.card.action[key]) for key in ("kp", "kd") if key in locomotor.card.action}
+    kp, kd = (float(locomotor.card.action[key]) for key in ("kp", "kd"))
     walkers, bare = [], None
     for setup in setups:
         if len(setup.blocks):
-            model = build_scene(plan.boxes, setup.blocks.boxes(), **gains)
+            model = build_scene(plan.boxes, setup.blocks.boxes(), kp=kp, kd=kd)
         else:
-            model = bare = bare or build_scene(plan.boxes, Blocks.empty().boxes(), **gains)
+            model = bare = bare or build_scene(plan.boxes, Blocks.empty().boxes(), kp=kp, kd=kd)
         walker = Walker(model)
-        walker.spawn(*setup.route.start.tolist(), setup.yaw, setup.joints)
+        walker.spawn(float(setup.route.start[0]), float(setup.route.start[1]), setup.yaw, setup.joints)
         walkers.append(walker)
     return walkers
 

@@ -19,12 +19,11 @@ TOUCH_SENSORS = ("touch_blocks", "touch_walls", "touch_ground")
 FORCE_SENSORS = tuple(f"force_{foot}" for foot in FOOT_GEOMS)
 """Three numbers each, the net contact force on a foot in the world frame [N], up to its sign."""
 
-_FOUND, _FORCE = (1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND)), (1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE))
+_FOUND = 1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND)
+_FORCE = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE)
 _ANY, _NET_FORCE = 0, 3
-_SOLID = {
-    "contype": 1,
-    "conaffinity": 0,
-}  # the robot's geoms have it the other way round, so that they never touch each other
+_SOLID = {"contype": 1, "conaffinity": 0}
+"""The robot's geoms have it the other way round: they touch the world, never each other."""
 
 
 def build_scene(

@@ -14,7 +14,7 @@ from jaxtyping import Float, UInt8
 from vinl.evaluation.config import EvaluationConfig
 from vinl.evaluation.panels import MapPanel, colour_depth, compose
 from vinl.evaluation.records import Episode
-from vinl.evaluation.rollout import Interrupted
+from vinl.evaluation.rollout import InterruptedRunError
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
 from vinl.robot.rotation import matrix_of, yaw_of
@@ -65,7 +65,7 @@ def film(job: FilmJob, config: EvaluationConfig, is_stopped: Callable[[], bool] 
         The file's name in the folder.
 
     Raises:
-        Interrupted: ``is_stopped`` said so.
+        InterruptedRunError: ``is_stopped`` said so.
     """
     out = Path(job.out)
     out.mkdir(parents=True, exist_ok=True)
@@ -74,16 +74,14 @@ def film(job: FilmJob, config: EvaluationConfig, is_stopped: Callable[[], bool] 
     try:
         for frame in draw_frames(job, config):
             if is_stopped():
-                raise Interrupted
+                raise InterruptedRunError
             if writer is None:
                 size = (frame.shape[1], frame.shape[0])
                 writer = imageio_ffmpeg.write_frames(
                     str(scratch),
                     size,
-                    fps=FPS,
-                    codec="libx264",
+                    fps=FPS,  # type: ignore[arg-type]
                     quality=6,
-                    macro_block_size=16,
                     ffmpeg_log_level="error",
                 )
                 writer.send(None)

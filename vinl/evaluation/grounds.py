@@ -1,0 +1,117 @@
+"""The grounds that a locomotor is tried on: level floor, the stage-1 terrains, scattered blocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+from vinl.config.errors import InputError
+from vinl.evaluation.scene import build_scene
+from vinl.world.blocks import Blocks
+from vinl.world.boxes import Boxes
+from vinl.world.grid import GridFrame
+from vinl.world.heightfield import BLOCK, HeightField, flat_field, raise_boxes
+from vinl.world.terrain import TILE, TerrainConfig, build_terrain, draw_blocks, scatter_centres
+
+TerrainName = Literal["flat", "rough", "blocks"]
+TERRAINS = ("flat", "rough", "blocks")
+
+FIELD = 12.0
+"""Half the side of the square that the blocks cover [m]."""
+
+UNSEEN = 7919
+"""Added to the seed of the terrain, so that it is not the one of the training."""
+
+_RESOLUTION = 0.05
+
+
+@dataclass(frozen=True)
+class GroundConfig:
+    """Which ground.
+
+    Attributes:
+        terrain: ``flat``, ``rough`` (the five types of stage 1) or ``blocks``.
+        density: blocks per m2, for ``blocks``.
+        level: level of all robots, for ``rough``; spread evenly over levels 1 to 9 if None.
+        seed: of the terrain.
+        kp, kd: gains of the joints.
+    """
+
+    terrain: TerrainName
+    density: float
+    level: int | None
+    seed: int
+    kp: float
+    kd: float
+
+    def __post_init__(self) -> None:
+        if self.terrain not in TERRAINS:
+            raise InputError(f"--terrain {self.terrain!r} is unknown; known: {', '.join(TERRAINS)}")
+        if not 0 < self.density <= 4:
+            raise InputError(f"--density must lie in (0, 4] blocks per m2, got {self.density:g}")
+        if self.level is not None and not 0 <= self.level <= 9:
+            raise InputError(f"--level must lie between 0 and 9, got {self.level}")
+        if self.level is not None and self.terrain != "rough":
+            raise InputError(f"--level is for --terrain rough, not for {self.terrain}")
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """A compiled world for robots that do not see each other.
+
+    Attributes:
+        model: the world.
+        field: what the height scan reads.
+        homes: (h, 3) where robots start: x, y and ground height [m].
+        levels: (h,) level of each home; -1 where there are none.
+        kinds: terrain type of each home.
+        reach: a robot that is farther from home than this along x or y [m] is put back.
+        spread: half-width of the square around home that robots start in [m].
+        blocks: the blocks, which starts keep clear of.
+    """
+
+    model: mujoco.MjModel
+    field: HeightField
+    homes: Float[np.ndarray, "h 3"]
+    levels: Int[np.ndarray, " h"]
+    kinds: list[str]
+    reach: float
+    spread: float
+    blocks: Blocks
+
+
+def build_ground(config: GroundConfig) -> Ground:
+    """Draw the ground and compile it."""
+    middle, none = np.zeros((1, 3)), np.array([-1])
+    if config.terrain == "rough":
+        return _build_rough(config)
+    cells = round(2 * (FIELD + 2) / _RESOLUTION) + 1
+    field = flat_field(GridFrame(-(FIELD + 2), -(FIELD + 2), _RESOLUTION, (cells, cells)))
+    blocks = Blocks.empty()
+    if config.terrain == "blocks":
+        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence([config.seed, UNSEEN])))
+        spacing = 0.75 if config.density <= 1 else 0.75 / config.density**0.5
+        count = round(config.density * (2 * FIELD) ** 2)
+        centres = scatter_centres(rng, count, FIELD, 0.0, spacing, np.zeros((0, 2)))
+        blocks = draw_blocks(rng, centres, (0.1, 0.2))
+        raise_boxes(field, blocks.boxes(), BLOCK)
+    model = build_scene(Boxes.empty(), blocks.boxes(), kp=config.kp, kd=config.kd)
+    reach = FIELD - 1 if len(blocks) else np.inf
+    return Ground(model, field, middle, none, [config.terrain], reach, FIELD * 2 / 3, blocks)
+
+
+def _build_rough(config: GroundConfig) -> Ground:
+    terrain = build_terrain(TerrainConfig(seed=UNSEEN + config.seed))
+    model = build_scene(Boxes.empty(), Boxes.empty(), terrain.ground, kp=config.kp, kd=config.kd)
+    # the first level is level floor, so that 9, 8 ... 1, 9 ... has a mean of at least 5 for any number of robots
+    chosen = [config.level] if config.level is not None else list(range(9, 0, -1))
+    columns = len(terrain.kinds)
+    # 7 has no divisor in common with 20 columns: types and levels are mixed
+    pairs = [(chosen[k % len(chosen)], (7 * k) % columns) for k in range(len(chosen) * columns)]
+    homes = np.array([terrain.starts[level, column] for level, column in pairs])
+    levels, kinds = np.array([level for level, _ in pairs]), [terrain.kinds[column] for _, column in pairs]
+    return Ground(model, terrain.ground, homes, levels, kinds, TILE / 2, 0.5, Blocks.empty())
