@@ -49,13 +49,13 @@ def main(argv: list[str]) -> int:
     out = check_out(options.out)
     workers = os.cpu_count() or 1 if options.workers is None else options.workers
     check_locomotor_numbers(options.robots, options.seconds, options.seed, workers)
-    terrain = GroundConfig(options.terrain, options.density, options.level, options.seed, 1.0, 1.0).terrain  # type: ignore[arg-type]
+    GroundConfig(options.terrain, options.density, options.level, options.seed, 1.0, 1.0)  # refuses what it cannot draw
     policy = load_policy(options.policy, options.device)
     console = Console()
     with Progress(console) as progress:
         results = evaluate_locomotor(
             policy,
-            terrain,
+            options.terrain,
             options.robots,
             options.seconds,
             options.seed,

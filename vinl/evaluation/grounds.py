@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import mujoco
 import numpy as np
@@ -17,7 +16,6 @@ from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, HeightField, flat_field, raise_boxes
 from vinl.world.terrain import TILE, TerrainConfig, build_terrain, draw_blocks, scatter_centres
 
-TerrainName = Literal["flat", "rough", "blocks"]
 TERRAINS = ("flat", "rough", "blocks")
 
 FIELD = 12.0
@@ -41,7 +39,7 @@ class GroundConfig:
         kp, kd: gains of the joints.
     """
 
-    terrain: TerrainName
+    terrain: str
     density: float
     level: int | None
     seed: int

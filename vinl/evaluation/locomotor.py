@@ -14,7 +14,7 @@ from jaxtyping import Float
 from vinl.config.errors import InputError
 from vinl.evaluation.crew import Context, Crew
 from vinl.evaluation.evaluate import describe_policy
-from vinl.evaluation.grounds import Ground, GroundConfig, TerrainName, build_ground
+from vinl.evaluation.grounds import Ground, GroundConfig, build_ground
 from vinl.evaluation.walker import Walker, joint_targets
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
@@ -88,7 +88,7 @@ def command_ranges(policy: Policy) -> CommandRanges:
 
 def evaluate_locomotor(
     policy: Policy,
-    terrain: TerrainName = "flat",
+    terrain: str = "flat",
     robots: int = 64,
     seconds: float = 20.0,
     seed: int = 0,

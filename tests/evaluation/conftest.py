@@ -1,0 +1,43 @@
+"""A small home and a policy that stands still, for all tests of the evaluation."""
+
+import numpy as np
+import pytest
+import torch
+
+from vinl.policies.card import locomotion_card
+from vinl.policies.networks import MapActor
+from vinl.policies.policy import LocomotionPolicy
+from vinl.world.boxes import Boxes
+from vinl.world.floorplan import FloorPlan, assemble_floorplan, frame_around
+
+
+@pytest.fixture(scope="session")
+def two_rooms() -> FloorPlan:
+    """Two rooms of 4.5 m x 6 m with a door of 0.9 m between them, and a table in the first."""
+    w, h, t = 9.0, 6.0, 0.1
+    walls = [[w / 2, y, 0, w + t, t, 0, 2.5] for y in (0, h)]
+    walls += [[x, h / 2, 0, t, h + t, 0, 2.5] for x in (0, w)]
+    walls += [[w / 2, y, 0, t, h / 2 - 0.45, 0, 2.5] for y in (h / 4 - 0.225, 3 * h / 4 + 0.225)]
+    frame = frame_around(np.zeros(2), np.array([w, h]), "two_rooms")
+    xs, ys = frame.centres()
+    inside = np.outer((ys > 0) & (ys < h), (xs > 0) & (xs < w))
+    table = Boxes(np.array([[2.0, 1.0, 0, 1.0, 0.6, 0, 0.8]]))
+    return assemble_floorplan("two_rooms", "test", Boxes(np.array(walls)), table, inside, frame)
+
+
+@pytest.fixture(scope="session")
+def standing() -> LocomotionPolicy:
+    """A policy whose action is always zero."""
+    network = MapActor(encoder=(8,), code=4, actor=(8,))
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter.zero_()
+    return LocomotionPolicy(network, locomotion_card("standing", network.describe()))
+
+
+@pytest.fixture(scope="session")
+def trotting() -> LocomotionPolicy:
+    """An untrained policy: it moves its legs somehow, so that two runs have something to agree on."""
+    torch.manual_seed(0)
+    network = MapActor(encoder=(8,), code=4, actor=(8,))
+    return LocomotionPolicy(network, locomotion_card("trotting", network.describe()))
