@@ -15,13 +15,18 @@ from vinl.evaluation.records import Episode, EpisodeTrace
 from vinl.robot.aliengo import LENGTH
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
-from vinl.world.floorplan import FloorPlan
+from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 
 CONTACT_CLASS = dict(zip(KINDS, ("fb", "fw", "lb", "lw", "tb", "tw"), strict=True))
 """Style class of each kind of contact."""
 
 _MARGIN = 0.4
 _GRAIN = 0.02
+
+
+def keep_low(boxes: Boxes) -> Boxes:
+    """The boxes that the robot could run into; lintels over doors are not drawn."""
+    return Boxes(boxes.rows[boxes.rows[:, 5] < BODY_HEIGHT])
 
 
 def outline_boxes(boxes: Boxes) -> str:
@@ -76,8 +81,8 @@ def draw_map(plan: FloorPlan, episodes: Sequence[Episode], first: int, radius: f
         f'style="--w:{width / height:.3f}">',
         f'<image href="{draw_floor(plan.inside)}" x="{x[0] - half:.3f}" y="{-y[-1] - half:.3f}" '
         f'width="{x[-1] - x[0] + 2 * half:.3f}" height="{y[-1] - y[0] + 2 * half:.3f}" preserveAspectRatio="none"/>',
-        f'<path class="furniture" d="{outline_boxes(plan.furniture)}"/>',
-        f'<path class="wall" d="{outline_boxes(plan.walls)}"/>',
+        f'<path class="furniture" d="{outline_boxes(keep_low(plan.furniture))}"/>',
+        f'<path class="wall" d="{outline_boxes(keep_low(plan.walls))}"/>',
     ]
     for k, episode in enumerate(episodes):
         record, trace = episode.record, episode.trace

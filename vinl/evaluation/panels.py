@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from PIL import Image, ImageDraw, ImageFont
 
+from vinl.evaluation.drawing import keep_low
 from vinl.evaluation.records import EpisodeRecord
 from vinl.robot.aliengo import LENGTH, WIDTH
 from vinl.world.blocks import Blocks
@@ -60,7 +61,11 @@ class MapPanel:
         corner = self._at(np.array([x[0] - half, y[-1] + half]))
         size = (round(mask.width * 2 * half * self._scale), round(mask.height * 2 * half * self._scale))
         self._image.paste(_FLOOR, tuple(np.rint(corner).astype(int).tolist()), mask.resize(size))
-        for boxes, colour in ((plan.furniture, _FURNITURE), (plan.walls, _WALL), (blocks.boxes(), _BLOCK)):
+        for boxes, colour in (
+            (keep_low(plan.furniture), _FURNITURE),
+            (keep_low(plan.walls), _WALL),
+            (blocks.boxes(), _BLOCK),
+        ):
             self._fill(boxes, colour)
         self._disc(np.array(record.start), 0.15, _START)
         self._disc(np.array(record.goal), radius, _GOAL)

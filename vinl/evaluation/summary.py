@@ -24,7 +24,8 @@ _COLUMNS = (
 
 def print_summary(console: Console, results: Results, out: Path) -> None:
     """One row a plan, one for all, and where the files lie."""
-    table = Table("plan", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("plan", overflow="fold")
     for title in (*[title for _, title, _, _ in _COLUMNS], "falls", "n"):
         table.add_column(title, justify="right", no_wrap=True)
     min_metres = results.config["evaluation"]["min_metres"]
@@ -35,7 +36,9 @@ def print_summary(console: Console, results: Results, out: Path) -> None:
     table.add_row("all", *_cells(results.aggregate), style="bold")
     console.print(table)
     success, rate = results.aggregate["success"], results.aggregate["foot_collisions_per_m"]
-    console.print(f"success {_interval(success, 100, 1)} %, foot collisions {_interval(rate, 1, 2)} per metre")
+    console.print(
+        f"success {_interval(success, 100, 1)} %, foot collisions {_interval(rate, 1, 2)} per metre", soft_wrap=True
+    )
     console.print(
         f"{results.wall_seconds:.0f} s; report {out / 'report.html'}; figures {out / 'results.json'}", soft_wrap=True
     )
