@@ -97,6 +97,7 @@ def evaluate(
     check_numbers(episodes, seeds, first_seed, obstacles, workers)
     load_navigator(navigator, config)
     policy = load_policy(locomotor) if isinstance(locomotor, (str, Path)) else locomotor
+    check_senses(policy)
     began = time.perf_counter()
     plans = _name_apart(floorplans)
     jobs = []
@@ -180,6 +181,16 @@ def _name_apart(plans: Sequence[FloorPlan]) -> list[FloorPlan]:
         k = taken[plan.name]
         apart.append(plan if k == 1 else replace(plan, name=f"{plan.name}-{k}"))
     return apart
+
+
+def check_senses(policy: Policy) -> None:
+    """Refuse a policy that observes what the roll-out does not provide.
+
+    Raises:
+        InputError: it sees through a camera.
+    """
+    if policy.card.camera is not None:
+        raise InputError(f"policy {policy.card.name} sees through a camera; the evaluation only has the height scan")
 
 
 def check_numbers(episodes: int, seeds: int, first_seed: int, obstacles: str, workers: int) -> None:

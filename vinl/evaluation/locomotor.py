@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from vinl.config.errors import InputError
 from vinl.evaluation.crew import Context, Crew
-from vinl.evaluation.evaluate import describe_policy
+from vinl.evaluation.evaluate import check_senses, describe_policy
 from vinl.evaluation.grounds import Ground, GroundConfig, build_ground
 from vinl.evaluation.walker import Walker, joint_targets
 from vinl.policies.policy import Policy
@@ -114,6 +114,7 @@ def evaluate_locomotor(
         InputError: a number is out of range.
     """
     check_locomotor_numbers(robots, seconds, seed, workers)
+    check_senses(policy)
     action = policy.card.action
     ground = GroundConfig(terrain, density, level, seed, float(action["kp"]), float(action["kd"]))
     ranges, began, done = command_ranges(policy), time.perf_counter(), 0

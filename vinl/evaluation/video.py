@@ -33,8 +33,8 @@ POSE_DT = 2 * CONTROL_DT
 FPS = 12.5
 """Pictures a second of a film: every second pose at natural speed."""
 
-MAX_FRAMES = 500
-"""A film of more pictures than this (40 s) runs at twice, three times ... the natural speed instead."""
+MAX_FRAMES = 300
+"""A film of more pictures than this (24 s) runs at twice, three times ... the natural speed instead."""
 
 ROBOT_SIZE = (640, 512)
 """Width and height of the picture of the robot as rendered [pixels]; it is shown a quarter larger. 0.1 s a picture."""
