@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 
 from vinl.config.errors import InputError
 from vinl.robot.aliengo import KD, KP
@@ -64,8 +64,9 @@ class RewardConfig:
         orientation: squared tilt of the trunk.
         stand_still: joint angles away from the default pose while told to stand.
         fall: one fall (not multiplied by the control step).
+        velocity_error: squared error of the commanded velocity in the plane.
         sigma: width of the tracking terms [(m/s)^2].
-        clip_at_zero: hold the sum of a step to at least zero [legged_gym].
+        floor: the sum of a step's terms is held to at least this for each second [legged_gym: 0].
     """
 
     linear_velocity: float = 1.0
@@ -80,13 +81,16 @@ class RewardConfig:
     obstacle_contact: float = 0.0
     orientation: float = 0.0
     stand_still: float = 0.0
+    velocity_error: float = 0.0
     fall: float = 0.0
     sigma: float = 0.25
-    clip_at_zero: bool = True
+    floor: float = 0.0
 
     def __post_init__(self) -> None:
         if self.sigma <= 0:
             raise InputError(f"rewards.sigma must be positive, got {self.sigma}")
+        if self.floor > 0:
+            raise InputError(f"rewards.floor must not be positive, got {self.floor}")
 
 
 @dataclass(frozen=True)
@@ -202,25 +206,35 @@ class AnnealConfig:
 
     Attributes:
         begin, end: shares of the iterations between which the settings move, linearly.
-        sigma: ``rewards.sigma`` at the end [(m/s)^2].
-        entropy: ``ppo.entropy`` at the end.
+        rewards: names and last values of settings of ``RewardConfig`` that move.
+        entropy: last value of ``ppo.entropy``; None: it stays.
     """
 
     begin: float = 0.6
-    end: float = 0.95
-    sigma: float = 0.25
-    entropy: float = 0.01
+    end: float = 0.9
+    rewards: dict[str, float] = field(default_factory=dict)
+    entropy: float | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= self.begin < self.end <= 1:
             raise InputError(f"anneal: need 0 <= begin < end <= 1, got {self.begin} and {self.end}")
-        if self.sigma <= 0 or self.entropy < 0:
-            raise InputError("anneal: sigma must be positive and entropy not negative")
+        if self.entropy is not None and self.entropy < 0:
+            raise InputError(f"anneal.entropy must not be negative, got {self.entropy}")
+        try:
+            RewardConfig(**self.rewards)
+        except TypeError:
+            known = {f.name for f in fields(RewardConfig)}
+            raise InputError(f"anneal.rewards: unknown term {', '.join(sorted(set(self.rewards) - known))}") from None
 
     def blend(self, share: float, before: float, after: float) -> float:
         """The value of a setting after a share of the iterations."""
         moved = min(max((share - self.begin) / (self.end - self.begin), 0.0), 1.0)
         return before + moved * (after - before)
+
+    def rewards_at(self, share: float, first: RewardConfig) -> RewardConfig:
+        """The reward settings after a share of the iterations, starting from ``first``."""
+        moved = {name: self.blend(share, getattr(first, name), last) for name, last in self.rewards.items()}
+        return replace(first, **moved)
 
 
 @dataclass(frozen=True)

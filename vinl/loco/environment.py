@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import asdict, fields
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -11,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from vinl.loco.commands import DRAWS, between, draw_commands
-from vinl.loco.config import LocoConfig
+from vinl.loco.config import LocoConfig, RewardConfig
 from vinl.loco.curriculum import next_levels
 from vinl.loco.rewards import Motion, reward_terms
 from vinl.loco.simulation import Body, Contacts, Ground, Simulation
@@ -32,6 +33,9 @@ _UPSIDE = -0.3
 
 _MEASURE_SIGMA = 0.25
 """Width of the tracking terms in the measures, whatever the reward's: curves of different trainings compare."""
+
+TERMS = tuple(field.name for field in fields(RewardConfig) if field.name not in ("sigma", "floor"))
+"""The reward terms, in the order of the configuration."""
 
 MEASURES = (
     "steps",
@@ -116,13 +120,11 @@ class LocoEnvironment:
         terrain: the ground with its tiles.
         state: of all robots; ``step`` replaces it.
         num_envs: number of robots.
-        sigma: width of the tracking rewards [(m/s)^2]; a training may narrow it.
     """
 
     def __init__(self, config: LocoConfig, seed: int | None = None) -> None:
         self.config = config
         self.num_envs = config.num_envs
-        self.sigma = config.rewards.sigma
         self.terrain = build_terrain(config.terrain)
         self.simulation = Simulation(self.terrain.ground, config.kp, config.kd)
         self.episode_steps = round(config.episode_length / CONTROL_DT)
@@ -130,14 +132,15 @@ class LocoEnvironment:
         self._starts = jax.device_put(jnp.asarray(self.terrain.starts, jnp.float32), device)
         frame = self.simulation.frame
         self._edge = np.array([-frame.x0, -frame.y0]) - _EDGE
-        self._weights = {name: getattr(config.rewards, name) for name in self._term_names()}
+        self.set_rewards(config.rewards)
         self._step = jax.jit(self._advance, donate_argnums=(1,))
         self._look = jax.jit(self._observations)
         key = jax.random.PRNGKey(config.seed if seed is None else seed)
         self.state: State = jax.device_put(jax.jit(self._first_state)(key), device)
 
-    def _term_names(self) -> list[str]:
-        return [name for name in vars(self.config.rewards) if name not in ("sigma", "clip_at_zero")]
+    def set_rewards(self, rewards: RewardConfig) -> None:
+        """Weights and widths from the next step on; a training may move them without compiling anew."""
+        self._rewards = {name: np.float32(value) for name, value in asdict(rewards).items()}
 
     # ---- what the learner calls -----------------------------------------------------------------------------------
 
@@ -147,14 +150,14 @@ class LocoEnvironment:
 
     def step(self, action: Float[Array, "n 12"]) -> StepResult:
         """One control step; robots whose episode ends start anew at once. The old state is given up."""
-        self.state, result = self._step(self.simulation.ground, self.state, action, self.sigma)
+        self.state, result = self._step(self.simulation.ground, self.state, action, self._rewards)
         return result
 
     def read_measures(self) -> dict[str, float]:
         """The sums since the last call, as means over robot steps, and set to zero. The only wait for the device."""
         sums = np.asarray(self.state.sums, dtype=np.float64)
         self.state = self.state._replace(sums=jax.device_put(jnp.zeros_like(self.state.sums), jax.devices()[0]))
-        names = [*MEASURES, *(f"reward/{name}" for name in self._weights)]
+        names = [*MEASURES, *(f"reward/{name}" for name in TERMS)]
         raw = dict(zip(names, sums.tolist(), strict=True))
         steps, metres = max(raw["steps"], 1.0), max(raw["metres"], 1e-6)
         ends = max(raw["falls"] + raw["timeouts"], 1.0)
@@ -219,7 +222,7 @@ class LocoEnvironment:
             column=column,
             friction=between(c.randomisation.friction, u[:, 33]),
             added_mass=between(c.randomisation.added_mass, u[:, 34]),
-            sums=jnp.zeros(len(MEASURES) + len(self._weights)),
+            sums=jnp.zeros(len(MEASURES) + len(TERMS)),
         )
         return _strong(state)
 
@@ -233,7 +236,7 @@ class LocoEnvironment:
         return exact + self.config.randomisation.observation_noise * jnp.asarray(NOISE) * (2 * noise - 1), exact
 
     def _advance(
-        self, ground: Ground, old: State, action: Float[Array, "n 12"], sigma: float
+        self, ground: Ground, old: State, action: Float[Array, "n 12"], rewards: dict[str, Any]
     ) -> tuple[State, StepResult]:
         c, n = self.config, self.num_envs
         key, draw = jax.random.split(old.key)
@@ -249,11 +252,12 @@ class LocoEnvironment:
         torque = jnp.where(broken[:, None], 0.0, torque)
 
         motion, touching = self._motion(old, body, contacts, torque, action, broken)
-        terms = reward_terms(motion, sigma)
-        weighted = {k: jnp.nan_to_num(terms[k]) * (w * CONTROL_DT) for k, w in self._weights.items()}
+        terms = reward_terms(motion, rewards["sigma"])
+        weighted = {name: jnp.nan_to_num(terms[name]) * (rewards[name] * CONTROL_DT) for name in TERMS}
         total = jnp.sum(jnp.stack([value for name, value in weighted.items() if name != "fall"]), 0)
-        clipped = total < 0
-        reward = (jnp.maximum(total, 0.0) if c.rewards.clip_at_zero else total) + weighted["fall"]
+        floor = rewards["floor"] * CONTROL_DT
+        clipped = total < floor
+        reward = jnp.maximum(total, floor) + weighted["fall"]
 
         # ends of episodes and levels
         speed = jnp.linalg.norm(old.command[:, :2], axis=1)
@@ -364,7 +368,7 @@ class LocoEnvironment:
             "level": level,
             "clipped": clipped,
         }
-        ordered = [values[name] for name in MEASURES] + [weighted[name] for name in self._weights]
+        ordered = [values[name] for name in MEASURES] + [weighted[name] for name in TERMS]
         return jnp.stack([jnp.sum(jnp.nan_to_num(value), dtype=jnp.float32) for value in ordered])
 
 

@@ -44,7 +44,7 @@ class Motion(NamedTuple):
     fallen: Bool[Array, " n"]
 
 
-def reward_terms(m: Motion, sigma: float) -> dict[str, Float[Array, " n"]]:
+def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"]]:
     """Every term by its name in ``RewardConfig`` [ViNL code, section 2 of its rewards].
 
     Args:
@@ -55,10 +55,11 @@ def reward_terms(m: Motion, sigma: float) -> dict[str, Float[Array, " n"]]:
         Term name to (n,) values; ``fall`` is divided by the control step, so that its weight is per fall.
     """
     speed = jnp.linalg.norm(m.command[:, :2], axis=1)
+    error2 = jnp.sum((m.command[:, :2] - m.linear[:, :2]) ** 2, 1)
     foot_hit, shank_hit = m.contacts.foot_block | m.contacts.foot_wall, m.contacts.shank_block | m.contacts.shank_wall
     told_to_stand = (speed < 0.1) & (jnp.abs(m.command[:, 2]) < 0.1)
     return {
-        "linear_velocity": jnp.exp(-jnp.sum((m.command[:, :2] - m.linear[:, :2]) ** 2, 1) / sigma),
+        "linear_velocity": jnp.exp(-error2 / sigma),
         "yaw_rate": jnp.exp(-((m.command[:, 2] - m.angular[:, 2]) ** 2) / sigma),
         "vertical_velocity": m.linear[:, 2] ** 2,
         "roll_pitch_rate": jnp.sum(m.angular[:, :2] ** 2, 1),
@@ -70,5 +71,6 @@ def reward_terms(m: Motion, sigma: float) -> dict[str, Float[Array, " n"]]:
         "obstacle_contact": (foot_hit.sum(1) + shank_hit.sum(1)).astype(jnp.float32),
         "orientation": jnp.sum(m.gravity[:, :2] ** 2, 1),
         "stand_still": jnp.sum(jnp.abs(m.joints - jnp.asarray(DEFAULT_POSE, jnp.float32)), 1) * told_to_stand,
+        "velocity_error": error2,
         "fall": m.fallen / CONTROL_DT,
     }

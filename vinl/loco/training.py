@@ -117,8 +117,9 @@ def train_locomotor(
         save_policy(run.policy, actor, card)
 
     def schedule(algorithm: Any, share: float) -> None:
-        environment.sigma = config.anneal.blend(share, config.rewards.sigma, config.anneal.sigma)
-        algorithm.entropy_coef = config.anneal.blend(share, config.ppo.entropy, config.anneal.entropy)
+        environment.set_rewards(config.anneal.rewards_at(share, config.rewards))
+        if config.anneal.entropy is not None:
+            algorithm.entropy_coef = config.anneal.blend(share, config.ppo.entropy, config.anneal.entropy)
 
     runner = TrainingRunner(env, rsl_rl_settings(config), run, device, export, describe_figures, schedule, save_every)
     if resume:

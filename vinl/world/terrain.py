@@ -219,13 +219,14 @@ def build_terrain(config: TerrainConfig) -> Terrain:
     cells = frame.cell(starts[..., :2])
     for k, c in np.ndindex(config.levels, config.columns):
         i, j = cells[k, c]
-        starts[k, c, 2] = ground.heights[i - near : i + near + 1, j - near : j + near + 1].max()
+        here = slice(i - near, i + near + 1), slice(j - near, j + near + 1)
+        starts[k, c, 2] = ground.heights[here][ground.labels[here] != WALL].max()
     return Terrain(ground, starts, kinds, all_blocks, all_tall)
 
 
 def _off_the_start(boxes: Boxes) -> Boxes:
-    """The boxes of a tile that leave a disc of 0.7 m around its middle free."""
+    """The boxes of a tile that a robot can start beside: they leave a disc of 1.3 m around its middle free."""
     x, y, yaw, length, width = boxes.rows[:, :5].T
     u, v = -np.cos(yaw) * x - np.sin(yaw) * y, np.sin(yaw) * x - np.cos(yaw) * y
     gap = np.hypot(np.maximum(np.abs(u) - length / 2, 0), np.maximum(np.abs(v) - width / 2, 0))
-    return Boxes(boxes.rows[gap > 0.7])
+    return Boxes(boxes.rows[gap > 1.3])
