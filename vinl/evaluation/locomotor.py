@@ -75,15 +75,16 @@ class LocomotorResults:
     wall_seconds: float
 
 
-def command_ranges(policy: Policy) -> CommandRanges:
-    """What the policy was trained for, at most +-1 m/s and +-1 rad/s."""
+def command_ranges(policy: Policy, sideways: bool = False) -> CommandRanges:
+    """What the policy was trained for, at most +-1 m/s and +-1 rad/s; sideways velocities only if asked for."""
     trained = policy.card.training.get("commands", {})
 
     def cut(name: str) -> tuple[float, float]:
         low, high = trained.get(name, (-_COMMAND_LIMIT, _COMMAND_LIMIT))
         return max(float(low), -_COMMAND_LIMIT), min(float(high), _COMMAND_LIMIT)
 
-    return CommandRanges(cut("forward"), cut("left"), cut("yaw_rate"), float(trained.get("min_speed", 0.2)))
+    left = cut("left") if sideways else (0.0, 0.0)
+    return CommandRanges(cut("forward"), left, cut("yaw_rate"), float(trained.get("min_speed", 0.2)))
 
 
 def evaluate_locomotor(
@@ -94,6 +95,7 @@ def evaluate_locomotor(
     seed: int = 0,
     density: float = 1.0,
     level: int | None = None,
+    sideways: bool = False,
     workers: int = 1,
     on_progress: Callable[[str, int, int], None] = lambda *_: None,
 ) -> LocomotorResults:
@@ -107,6 +109,7 @@ def evaluate_locomotor(
         seed: of terrain, starts and commands.
         density: blocks per m2, for ``blocks``.
         level: level of all robots, for ``rough``; 1 to 9 by turns if None.
+        sideways: command sideways velocities too; a navigator only goes forward and turns.
         workers: processes; results do not depend on it.
         on_progress: called with ``"robot"``, robots done and robots in all.
 
@@ -117,7 +120,7 @@ def evaluate_locomotor(
     check_senses(policy)
     action = policy.card.action
     ground = GroundConfig(terrain, density, level, seed, float(action["kp"]), float(action["kd"]))
-    ranges, began, done = command_ranges(policy), time.perf_counter(), 0
+    ranges, began, done = command_ranges(policy, sideways), time.perf_counter(), 0
 
     def count() -> None:
         nonlocal done
