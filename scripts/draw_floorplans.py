@@ -170,7 +170,12 @@ class Home:
         # without the lines that stay open
         gone = unary_union([shapely.LineString([line[:2], line[2:]]).buffer(0.005) for line in self.open_lines])
         inside: Any = edges.difference(rim).difference(gone)
-        for a, b in pairwise(list(shell.exterior.simplify(0.005).coords)):
+        corners = list(shell.exterior.simplify(0.005).coords)[:-1]
+        for k, corner in enumerate(corners):
+            before, after = corners[k - 1], corners[(k + 1) % len(corners)]
+            beyond = corners[(k + 2) % len(corners)]
+            a = _shift_end(after, corner, before, self.outer / 2)
+            b = _shift_end(corner, after, beyond, self.outer / 2)
             self.walls.append({"from": _round(a), "to": _round(b), "thickness": self.outer})
         merged = linemerge(inside) if inside.geom_type == "MultiLineString" else inside
         for line in getattr(merged, "geoms", [merged]):
@@ -246,6 +251,17 @@ class Home:
 
 def _round(values) -> list[float]:
     return [round(float(v), 3) + 0.0 for v in values]
+
+
+def _shift_end(start, end, then, half: float) -> np.ndarray:
+    """Where a wall must end to meet the next one in a mitre [m].
+
+    Readers lengthen walls by half their thickness, which fills a square corner; at an obtuse one the box would stand
+    out, so that it ends earlier.
+    """
+    along, onward = (np.subtract(b, a) / np.linalg.norm(np.subtract(b, a)) for a, b in ((start, end), (end, then)))
+    turn = np.arccos(np.clip(along @ onward, -1.0, 1.0))
+    return np.asarray(end) + along * min(half * np.tan(turn / 2) - half, 0.0)
 
 
 def _rectangle(x: float, y: float, depth: float, width: float, angle: float):
@@ -416,11 +432,11 @@ def draw_old_town() -> Home:
     """Rooms that open into one another, thick walls, a street front that is not square to the rest."""
     home = Home(
         "old_town",
-        "old town flat: an enfilade of three salons behind thick walls, on a street that runs askew",
+        "old town flat: an enfilade of three salons behind thick walls, on a street that bends",
         {
             "library": [(0, 0.0), (4.6, -0.5), (4.6, 4.8), (0, 4.8)],
             "salon": [(4.6, -0.5), (10.2, -1.109), (10.2, 4.8), (4.6, 4.8)],
-            "bedroom": [(10.2, -1.109), (14.4, -1.565), (14.4, 4.8), (10.2, 4.8)],
+            "bedroom": box(10.2, -1.109, 14.4, 4.8),
             "entrance": box(0, 4.8, 3.2, 8.6),
             "dining": box(3.2, 4.8, 7.6, 8.6),
             "kitchen": box(7.6, 4.8, 11.2, 8.6),
@@ -439,7 +455,8 @@ def draw_old_town() -> Home:
     home.door(7.6, 6.0, "y", 1.0, 2.2)
     home.door(12.6, 4.8, "x", 1.0, 2.2)
     slope = -0.5 / 4.6
-    for x in (2.3, 6.0, 8.7, 12.2):
+    home.window(12.2, -1.109, "x", 1.3, (0.5, 2.7))
+    for x in (2.3, 6.0, 8.7):
         a, b = x - 0.65, x + 0.65
         home.windows.append({"from": _round((a, a * slope)), "to": _round((b, b * slope)), "span": [0.5, 2.7]})
     home.window(1.5, 8.6, "x", 1.1, (0.0, 2.3))
@@ -450,10 +467,10 @@ def draw_old_town() -> Home:
     home.put("desk", slab(1.6, 0.8, 0.76), 2.5, 1.9, 350.0)
     home.put("chair", chair(), 1.55, 2.07, 350.0)
     home.put("bookcase", chest(1.9, 0.4, 2.4), 4.6, 1.2, "W")
-    home.put("sofa", sofa(2.0), 4.6, 1.0, "E")
-    home.put("armchair", armchair(), 8.2, 0.1, 120.0)
-    home.put("round table", slab(0.9, 0.9, 0.5), 6.7, 1.0, 45.0)
-    home.put("grand piano", slab(1.45, 1.5, 1.0), 8.95, 1.5, 20.0)
+    home.put("sofa", sofa(2.0), 4.6, 0.85, "E")
+    home.put("armchair", armchair(), 10.2, 2.05, "W")
+    home.put("round table", slab(0.9, 0.9, 0.5), 7.0, 0.95, 45.0)
+    home.put("grand piano", slab(1.45, 1.5, 1.0), 9.2, 0.1, 354.0)
     home.put("sideboard", chest(1.8, 0.45, 0.95), 8.4, 4.8, "S")
     home.put("bed", bed(1.6), 14.4, 0.9, "W")
     home.put("wardrobe", wardrobe(1.7), 14.4, 3.7, "W")
