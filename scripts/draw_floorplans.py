@@ -351,7 +351,7 @@ def draw_mill_loft() -> Home:
     home.put("shelf wall", chest(2.9, 0.4, 2.0), 1.7, 4.15, "N")
     home.put("wardrobe", wardrobe(1.9), 3.1, 8.8, "S")
     home.put("chest", chest(1.2, 0.45, 0.9), 4.2, 6.9, "W")
-    home.put("sofa", sofa(2.4), 6.35, 3.55, "S")
+    home.put("sofa", sofa(2.4), 6.28, 3.55, "S")
     home.put("sofa", sofa(1.7), 4.75, 1.75, "E")
     home.put("coffee table", slab(1.2, 0.7, 0.38), 6.8, 1.75, 90.0)
     home.put("television", chest(2.0, 0.4, 0.5), 6.7, 0, "N")
@@ -361,7 +361,7 @@ def draw_mill_loft() -> Home:
     home.put("island", slab(2.2, 0.9, 0.92), 10.3, 6.3, "E")
     for y in (5.7, 6.3, 6.9):
         home.put("stool", slab(0.36, 0.36, 0.65), 9.6, y, "E")
-    home.put("dining table", table(2.2, 0.95, True), 10.2, 2.2, "E")
+    home.put("dining table", table(2.2, 0.95, True), 10.2, 2.45, "E")
     home.put("coats", chest(1.0, 0.4, 1.9), 7.4, 7.6, "E")
     home.put("bath", bath(1.8, 0.8), 5.6, 8.8, "S")
     home.put("toilet", toilet(), 7.4, 8.2, "W")

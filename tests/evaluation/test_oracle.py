@@ -1,5 +1,7 @@
 """The oracle drives a point that does what it is told."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,8 +10,11 @@ from vinl.evaluation.episodes import draw_routes
 from vinl.evaluation.navigator import Task, load_navigator
 from vinl.evaluation.oracle import OracleNavigator
 from vinl.evaluation.rollout import goal_in_heading_frame
+from vinl.evaluation.way import plan_way
+from vinl.world.boxes import Boxes
 from vinl.world.floorplan import FloorPlan
 from vinl.world.free_space import FreeSpace
+from vinl.world.raster import paint_boxes
 from vinl.world.readers import load_floorplan, shipped_floorplans
 
 
@@ -56,6 +61,34 @@ def test_plans_anew_when_carried_away(two_rooms: FloorPlan) -> None:
     for xy in ([1.0, 5.0], [8.0, 1.0], [-3.0, -3.0]):  # the last one is outside: it keeps to its old way
         choice = oracle.act({"pose": np.array([[*xy, 0.0]])})
         assert np.isfinite(choice).all()
+
+
+def test_walks_around_a_gap_that_is_too_narrow(two_rooms: FloorPlan) -> None:
+    t, x = 0.1, 4.5
+    # a gap of 0.5 m right ahead, and the open floor 4 m away
+    rows = np.array([[x, 0.55, 0, t, 1.1, 0, 2.5], [x, 3.1, 0, t, 3.0, 0, 2.5]])
+    free = two_rooms.inside & ~paint_boxes(Boxes(rows), two_rooms.frame)
+    space = FreeSpace(replace(two_rooms, free=free))
+    way = plan_way(space, np.array([3.5, 1.35]), np.array([5.5, 1.35])).points
+    assert way[np.abs(way[:, 0] - x).argmin(), 1] > 4.5
+    # where there is no other way, it squeezes through
+    rows[1] = [x, 3.8, 0, t, 4.4, 0, 2.5]
+    space = FreeSpace(replace(two_rooms, free=two_rooms.inside & ~paint_boxes(Boxes(rows), two_rooms.frame)))
+    squeeze = plan_way(space, np.array([3.5, 1.35]), np.array([5.5, 1.35]))
+    assert squeeze.points[np.abs(squeeze.points[:, 0] - x).argmin(), 1] == pytest.approx(1.35, abs=0.06)
+    assert squeeze.ease.min() < 0.1
+
+
+def test_frees_itself_when_stuck(two_rooms: FloorPlan) -> None:
+    config = EvaluationConfig()
+    route = draw_routes(two_rooms, 1, config)[0]
+    oracle = OracleNavigator()
+    oracle.reset([Task(FreeSpace(two_rooms), route)])
+    pose = np.array([[*route.start, np.arctan2(*(route.goal - route.start)[::-1]) + 1.0]])
+    choices = np.concatenate([oracle.act({"pose": pose}) for _ in range(20)])
+    assert (choices[:6] == choices[0]).all(), "it tries for 3 s"
+    assert (choices[6:8] == [0.0, -np.sign(choices[0, 1]) * oracle.config.turn_rate]).all()
+    assert (choices[8:10] == [oracle.config.speed, 0.0]).all() and (choices[10] == choices[0]).all()
 
 
 def test_unknown_navigator() -> None:

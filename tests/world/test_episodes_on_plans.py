@@ -15,7 +15,7 @@ from vinl.world.grid import GridFrame
 from vinl.world.start_goal import sample_start_goals
 
 
-def build_plan(width=9.0, height=6.0, door=True) -> FloorPlan:
+def build_plan(width=9.0, height=6.0, door=True, gap=1.2) -> FloorPlan:
     """Two rooms side by side, a table in the left one, a cupboard hung on the wall in the right one."""
     t = 0.1
     rows = [
@@ -23,7 +23,7 @@ def build_plan(width=9.0, height=6.0, door=True) -> FloorPlan:
         [width / 2, height, 0, width + t, t, 0, 2.5],
         [0, height / 2, 0, t, height, 0, 2.5],
         [width, height / 2, 0, t, height, 0, 2.5],
-        [width / 2, height / 2 - (0.6 if door else 0), 0, t, height - (1.2 if door else 0), 0, 2.5],
+        [width / 2, height / 2 - (gap / 2 if door else 0), 0, t, height - (gap if door else 0), 0, 2.5],
     ]
     furniture = [[width / 4, height / 3, 0.4, 1.2, 0.8, 0, 0.75], [width * 0.8, height / 2, 0, 0.6, 0.4, 1.4, 2.0]]
     frame = GridFrame(-0.475, -0.475, 0.05, (int(height / 0.05) + 20, int(width / 0.05) + 20))
@@ -64,6 +64,14 @@ def test_start_and_goal_share_a_region_and_keep_clear(door):
         assert pair.geodesic_m >= pair.straight_m and -np.pi <= pair.yaw < np.pi
         assert pair.straight_m >= 5.0 or not door
         assert (pair.note == "") == door
+
+
+def test_no_way_leads_through_a_gap_that_the_robot_would_get_stuck_in():
+    plan = build_plan(14.0, 6.0, gap=0.5)
+    for pair in sample_start_goals(plan, 8, np.random.default_rng(1)):
+        assert (pair.start[0] < 7.0) == (pair.goal[0] < 7.0) and "left out" in pair.note
+    far = sample_start_goals(plan, 8, np.random.default_rng(1), min_distance=10.0)  # no room is that long
+    assert all(pair.straight_m >= 10.0 and "narrower" in pair.note for pair in far)
 
 
 def test_a_small_plan_says_how_far_it_allows():

@@ -5,6 +5,7 @@ from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
 from vinl.world.drawing import draw_floorplan, save_floorplan
 from vinl.world.free_space import FreeSpace
+from vinl.world.geodesic import distance_field
 from vinl.world.raster import paint_boxes
 from vinl.world.readers import load_floorplan, load_floorplans, shipped_floorplans
 from vinl.world.start_goal import sample_start_goals
@@ -31,6 +32,21 @@ def test_a_shipped_plan_is_a_home(name):
     pairs = sample_start_goals(plan, 6, np.random.default_rng(0))
     assert all(pair.straight_m >= 5.0 and not pair.note for pair in pairs)
     assert all(np.isfinite(pair.geodesic_m) for pair in pairs)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_episode_needs_a_squeeze(name):
+    plan = load_floorplan(name)
+    thin, wide = FreeSpace(plan), FreeSpace(plan, radius=0.35)
+    spots = (thin.regions == thin.largest) & (thin.clearance >= 0.5)
+    reached = spots & (wide.regions == wide.largest)
+    assert reached.sum() >= 0.99 * spots.sum()
+    # nor does a gap of less than 0.7 m make a way much shorter
+    for pair in sample_start_goals(plan, 3, np.random.default_rng(3)):
+        goal = pair.goal
+        thin_way, wide_way = (distance_field(space.traversable, plan.frame, goal)[reached] for space in (thin, wide))
+        far = thin_way > 3.0
+        assert (wide_way[far] <= 1.25 * thin_way[far]).all()
 
 
 def test_plans_are_drawn(tmp_path):

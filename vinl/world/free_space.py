@@ -14,6 +14,10 @@ from vinl.world.floorplan import FloorPlan, measure_clearance
 FOOTPRINT_RADIUS = 0.22
 """Radius that the floor is eroded by [m]: AlienGo's agent radius in the paper's navigator [facts/navigation 1]."""
 
+FIT_RADIUS = 0.27
+"""Radius for which the robot walks through a gap without touching its sides [m]: half its width over the legs (0.38 m),
+and 8 cm for sway and steering at 2 Hz. On a grid of 5 cm a doorway of 0.6 m still counts, one of 0.5 m does not."""
+
 
 @dataclass(frozen=True, eq=False)
 class FreeSpace:

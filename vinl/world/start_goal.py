@@ -10,11 +10,14 @@ from scipy.spatial import ConvexHull, QhullError
 
 from vinl.config.errors import InputError
 from vinl.world.floorplan import ROOM_TO_STAND, FloorPlan
-from vinl.world.free_space import FreeSpace
+from vinl.world.free_space import FIT_RADIUS, FreeSpace
 from vinl.world.geodesic import distance_field
 
 LEAST_WAY = 1.0
 """A plan without two spots this far apart [m] is refused: the robot would arrive where it starts."""
+
+_MOST = 0.9
+"""If less than this share of the floor hangs together, the note says so."""
 
 _TRIES = 200
 
@@ -29,7 +32,8 @@ class StartGoal:
         goal: shape (2,), goal [m].
         geodesic_m: shortest way over the free floor eroded by the robot's footprint [m].
         straight_m: straight distance [m].
-        note: why the distance or the clearance is less than was asked for; empty if it is not.
+        note: why the distance or the clearance is less than was asked for, or that floor was left out or gaps are
+            narrow; empty if all is well.
     """
 
     start: Float[np.ndarray, " 2"]
@@ -43,11 +47,15 @@ class StartGoal:
 def sample_start_goals(
     plan: FloorPlan, n: int, rng: np.random.Generator, min_distance: float = 5.0, clearance: float = 0.5
 ) -> list[StartGoal]:
-    """Draw pairs of start and goal, both in the largest connected region of the traversable floor.
+    """Draw pairs of start and goal, both in one region that the robot really fits through.
 
-    Pairs are uniform among those that keep the straight distance and the clearance. If no spot of the plan has the
+    The region is the largest that is connected for ``FIT_RADIUS``, so that no way leads only through a gap between
+    chairs that the robot would get stuck in. If that region is too small for the distance, but the largest one for
+    the navigator's ``FOOTPRINT_RADIUS`` is not, the latter takes its place.
+
+    Pairs are uniform among those that keep the straight distance and the clearance. If no spot of the region has the
     clearance, 0.4 m (the robot can still turn) takes its place; if no two spots are ``min_distance`` apart, 90 % of
-    the plan's largest distance does; the pair's note says so.
+    the region's largest distance does. The pair's note tells of all this.
 
     Args:
         plan: the floor plan.
@@ -62,13 +70,14 @@ def sample_start_goals(
     if n < 0 or not min_distance >= 0 or not clearance >= 0:
         raise InputError("start and goal: number, distance and clearance must not be negative")
     space = FreeSpace(plan)
-    notes = []
-    cells = np.argwhere((space.regions == space.largest) & (space.clearance >= clearance))
-    if len(cells) < 2:
-        cells = np.argwhere((space.regions == space.largest) & (space.clearance >= min(ROOM_TO_STAND, clearance)))
-        notes.append(f"no clearance of {clearance:.2f} m, {ROOM_TO_STAND:.2f} m instead")
-    spots = plan.frame.xy(cells)
-    widest = _measure_extent(spots) if len(spots) > 1 else 0.0
+    spots, notes = _find_spots(plan, FreeSpace(plan, radius=FIT_RADIUS), clearance)
+    widest = _measure_extent(spots)
+    if widest < min_distance:
+        more, more_notes = _find_spots(plan, space, clearance)
+        if _measure_extent(more) > max(widest, LEAST_WAY) + plan.frame.resolution:
+            gap = 2 * FIT_RADIUS
+            spots, notes = more, [*more_notes, f"some ways may lead through gaps narrower than {gap:.2f} m"]
+            widest = _measure_extent(spots)
     if widest < min(LEAST_WAY, min_distance):
         raise InputError(
             f"{plan.source}: the plan is too small for the robot: start and goal would be {widest:.1f} m apart; "
@@ -89,6 +98,21 @@ def sample_start_goals(
     return pairs
 
 
+def _find_spots(plan: FloorPlan, space: FreeSpace, clearance: float) -> tuple[Float[np.ndarray, "m 2"], list[str]]:
+    """Where starts and goals may lie in the largest region [m], and what is to be said about it."""
+    notes = []
+    region = space.regions == space.largest
+    cells = np.argwhere(region & (space.clearance >= clearance))
+    if len(cells) < 2:
+        cells = np.argwhere(region & (space.clearance >= min(ROOM_TO_STAND, clearance)))
+        notes.append(f"no clearance of {clearance:.2f} m, {ROOM_TO_STAND:.2f} m instead")
+    share = region.sum() / space.traversable.sum()
+    if share < _MOST:
+        gap = 2 * space.radius
+        notes.append(f"{1 - share:.0%} of the floor is left out: no way there is {gap:.2f} m wide")
+    return plan.frame.xy(cells), notes
+
+
 def _draw_pair(spots: np.ndarray, distance: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     for _ in range(_TRIES):
         start, goal = spots[rng.integers(len(spots), size=2)]
@@ -103,7 +127,9 @@ def _draw_pair(spots: np.ndarray, distance: float, rng: np.random.Generator) -> 
 
 
 def _measure_extent(spots: Float[np.ndarray, "m 2"]) -> float:
-    """Largest distance between two of the points."""
+    """Largest distance between two of the points; 0 for fewer than two."""
+    if len(spots) < 2:
+        return 0.0
     try:
         corners = spots[ConvexHull(spots).vertices]
     except QhullError:  # all on one line
