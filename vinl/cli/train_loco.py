@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import tyro
@@ -23,7 +23,9 @@ class Options:
     overrides: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
     """Settings of the config as key=value."""
     stage: int = 1
-    """1: walk on rough ground with the height scan."""
+    """1: walk on rough ground with the height scan. 2: step over blocks, seeing them in the height scan."""
+    from_policy: Annotated[str | None, tyro.conf.arg(name="from")] = None
+    """Start from the networks of this policy (a shipped name or a folder) or run; default: the config's."""
     config: str | None = None
     """Name of a shipped config or a YAML file; default: the stage's own."""
     out: str | None = None
@@ -42,7 +44,7 @@ class Options:
     """Seconds between checkpoints."""
 
 
-STAGES = {1: "loco/rough"}
+STAGES = {1: "loco/rough", 2: "loco/teacher"}
 
 
 def main(argv: list[str]) -> int:
@@ -52,6 +54,8 @@ def main(argv: list[str]) -> int:
         raise InputError(f"--stage {options.stage} does not exist; choose {', '.join(map(str, STAGES))}")
     if options.save_every <= 0:
         raise InputError(f"--save-every must be positive, got {options.save_every}")
+    if options.resume and options.from_policy:
+        raise InputError("--from starts a new run and --resume goes on with an old one; give one of them")
     if options.resume and (options.overrides or options.config or options.out or options.num_envs or options.seed):
         raise InputError("--resume goes on with the run's own config; only --iterations and --device may be given")
     from vinl.policies.device import choose_device
@@ -75,6 +79,10 @@ def main(argv: list[str]) -> int:
         short = {"num_envs": options.num_envs, "iterations": options.iterations, "seed": options.seed}
         overrides = [*options.overrides, *(f"{k}={v}" for k, v in short.items() if v is not None)]
         config = load_config(LocoConfig, source, overrides)
+        if options.from_policy is not None:
+            config = replace(config, from_policy=options.from_policy)
+        if options.stage not in (1, config.stage):
+            raise InputError(f"--stage {options.stage}: {source} is a config of stage {config.stage}")
         folder = options.out or f"runs/{source.removesuffix('.yaml').split('/')[-1]}"
     if options.iterations is not None and options.iterations < 1:
         raise InputError(f"--iterations must be at least 1, got {options.iterations}")

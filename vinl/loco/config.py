@@ -60,7 +60,8 @@ class RewardConfig:
         action_rate: squared change of the action.
         collision: shanks and trunk that touch anything.
         air_time: seconds over 0.5 that a foot was in the air, at touch-down.
-        obstacle_contact: feet and shanks that touch a block or wall.
+        obstacle_contact: feet that touch a block or wall.
+        leg_contact: shanks that touch a block or wall (``collision`` counts them once more).
         orientation: squared tilt of the trunk.
         stand_still: joint angles away from the default pose while told to stand.
         fall: one fall (not multiplied by the control step).
@@ -79,6 +80,7 @@ class RewardConfig:
     collision: float = -1.0
     air_time: float = 1.0
     obstacle_contact: float = 0.0
+    leg_contact: float = 0.0
     orientation: float = 0.0
     stand_still: float = 0.0
     velocity_error: float = 0.0
@@ -141,18 +143,23 @@ class CurriculumConfig:
         promote: share of the commanded way that promotes.
         demote: share of the commanded way that demotes when not reached.
         min_way: episodes with less commanded way than this [m] change nothing.
+        max_contacts: promote only robots with at most this many control steps of a foot or shank on blocks for each
+            metre of progress [1/m]; None: contacts do not matter.
     """
 
     first_level: int = 5
     promote: float = 0.75
     demote: float = 0.5
     min_way: float = 2.0
+    max_contacts: float | None = None
 
     def __post_init__(self) -> None:
         if self.first_level < 0:
             raise InputError("curriculum.first_level must not be negative")
         if not 0 <= self.demote <= self.promote:
             raise InputError("curriculum: need 0 <= demote <= promote")
+        if self.max_contacts is not None and self.max_contacts < 0:
+            raise InputError(f"curriculum.max_contacts must not be negative, got {self.max_contacts}")
 
 
 @dataclass(frozen=True)
@@ -169,7 +176,9 @@ class PpoConfig:
         entropy: weight of the entropy bonus.
         value: weight of the value loss.
         max_grad_norm: gradients are clipped to this norm.
-        init_std: standard deviation of the actions at the start.
+        init_std: standard deviation of the actions at the start, also after ``from_policy``.
+        critic_warmup: in so many first updates only the critic learns: one that starts afresh beside a trained actor
+            would otherwise teach it nonsense.
         actor, critic, encoder: widths of the hidden layers.
         code: size of the map code that the encoder makes of the height scan [paper III-A].
     """
@@ -186,6 +195,7 @@ class PpoConfig:
     value: float = 1.0
     max_grad_norm: float = 1.0
     init_std: float = 1.0
+    critic_warmup: int = 0
     actor: tuple[int, ...] = (512, 256, 128)
     critic: tuple[int, ...] = (512, 256, 128)
     encoder: tuple[int, ...] = (128, 64)
@@ -194,6 +204,8 @@ class PpoConfig:
     def __post_init__(self) -> None:
         if min(self.steps, self.epochs, self.minibatches) < 1:
             raise InputError("ppo: steps, epochs and minibatches must be at least 1")
+        if self.critic_warmup < 0:
+            raise InputError(f"ppo.critic_warmup must not be negative, got {self.critic_warmup}")
         if self.learning_rate <= 0 or self.desired_kl <= 0 or self.init_std <= 0:
             raise InputError("ppo: learning_rate, desired_kl and init_std must be positive")
         if not 0 < self.gamma <= 1 or not 0 <= self.lam <= 1:
@@ -242,7 +254,8 @@ class LocoConfig:
     """One locomotion training.
 
     Attributes:
-        stage: 1 (rough ground) for now.
+        stage: 1 (rough ground) or 2 (blocks).
+        from_policy: the policy or run whose networks the training starts from; None: fresh ones.
         num_envs: robots in parallel.
         iterations: updates.
         seed: of everything random.
@@ -251,6 +264,7 @@ class LocoConfig:
     """
 
     stage: int = 1
+    from_policy: str | None = None
     num_envs: int = 4096
     iterations: int = 1000
     seed: int = 1
@@ -266,8 +280,8 @@ class LocoConfig:
     anneal: AnnealConfig = field(default_factory=AnnealConfig)
 
     def __post_init__(self) -> None:
-        if self.stage not in (1,):
-            raise InputError(f"stage {self.stage} does not exist; choose 1")
+        if self.stage not in (1, 2):
+            raise InputError(f"stage {self.stage} does not exist; choose 1 or 2")
         if not 1 <= self.num_envs <= 65536:
             raise InputError(f"num_envs must lie between 1 and 65536, got {self.num_envs}")
         if self.iterations < 1:

@@ -18,6 +18,7 @@ def next_levels(
     commanded: Float[Array, " n"],
     life: Float[Array, " n"],
     u: Float[Array, " n"],
+    contacts: Float[Array, " n"] | float = 0.0,
 ) -> Int[Array, " n"]:
     """The levels after an episode.
 
@@ -30,6 +31,7 @@ def next_levels(
         commanded: (n,) way that the commands asked for [m].
         life: (n,) share of the whole episode that was lived, in (0, 1].
         u: (n,) uniform in [0, 1): those beyond the last level go to a random one [ViNL code].
+        contacts: (n,) control steps with a foot or shank on a block.
 
     Returns:
         (n,) new levels.
@@ -37,6 +39,8 @@ def next_levels(
     asked = jnp.where(fallen, commanded / life, commanded)  # a fall is held to the whole episode
     counted = asked > config.min_way
     up = timeout & counted & (way > config.promote * commanded)
+    if config.max_contacts is not None:
+        up &= contacts <= config.max_contacts * way
     down = (timeout | fallen) & counted & (way < config.demote * asked)
     new = level + up.astype(jnp.int32) - down.astype(jnp.int32)
     return jnp.where(new >= levels, (u * levels).astype(jnp.int32), jnp.maximum(new, 0))

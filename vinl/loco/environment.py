@@ -70,6 +70,7 @@ class State(NamedTuple):
         step: (n,) of the episode, from a random one at first; life: (n,) steps since the start.
         air_time: (n, 4) [s]; touched: (n, 4) feet on the ground in the last step.
         way, commanded: (n,) progress along the commands and what they asked for [m].
+        hits: (n,) steps of the episode with a foot or shank on a block.
         level, column: (n,) tile.
         friction, added_mass: (n,) of the robot.
         sums: (m,) of ``MEASURES`` and of the reward terms since they were last read.
@@ -87,6 +88,7 @@ class State(NamedTuple):
     touched: Bool[Array, "n 4"]
     way: Float[Array, " n"]
     commanded: Float[Array, " n"]
+    hits: Float[Array, " n"]
     level: Int[Array, " n"]
     column: Int[Array, " n"]
     friction: Float[Array, " n"]
@@ -126,7 +128,7 @@ class LocoEnvironment:
         self.config = config
         self.num_envs = config.num_envs
         self.terrain = build_terrain(config.terrain)
-        self.simulation = Simulation(self.terrain.ground, config.kp, config.kd)
+        self.simulation = Simulation(self.terrain.ground, config.kp, config.kd, self.terrain.blocks)
         self.episode_steps = round(config.episode_length / CONTROL_DT)
         device = jax.devices()[0]
         self._starts = jax.device_put(jnp.asarray(self.terrain.starts, jnp.float32), device)
@@ -218,6 +220,7 @@ class LocoEnvironment:
             touched=jnp.zeros((n, 4), bool),
             way=jnp.zeros(n),
             commanded=jnp.zeros(n),
+            hits=jnp.zeros(n),
             level=level,
             column=column,
             friction=between(c.randomisation.friction, u[:, 33]),
@@ -265,6 +268,7 @@ class LocoEnvironment:
         way = old.way + jnp.minimum(along, speed) * (speed > 0) * CONTROL_DT
         commanded = old.commanded + speed * CONTROL_DT
         step, life = old.step + 1, old.life + 1
+        hits = old.hits + (contacts.foot_block | contacts.shank_block).any(1)
         outside = jnp.any(jnp.abs(body.qpos[:, :2]) > self._edge, 1)
         timeout = ((step >= self.episode_steps) | outside) & ~motion.fallen
         done = motion.fallen | timeout
@@ -278,6 +282,7 @@ class LocoEnvironment:
             commanded,
             life / self.episode_steps,
             u[:, 35],
+            hits,
         )
         moved = jnp.linalg.norm(body.qpos[:, :2] - old.body.qpos[:, :2], axis=1)
         sums = self._measure(motion, old.level, reward, weighted, clipped, moved, timeout, life, broken)
@@ -307,6 +312,7 @@ class LocoEnvironment:
             touched=ended(jnp.zeros((n, 4), bool), contacts.foot),
             way=jnp.where(done, 0.0, way),
             commanded=jnp.where(done, 0.0, commanded),
+            hits=jnp.where(done, 0.0, hits),
             level=level,
             column=old.column,
             friction=old.friction,

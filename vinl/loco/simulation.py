@@ -13,7 +13,10 @@ from mujoco import mjx
 from scipy import ndimage
 
 from vinl.robot.aliengo import FOOT_GEOMS, SHANK_SPHERES, SUBSTEPS, TRUNK_SPHERES
+from vinl.robot.aliengo import LEGS as LEG_NAMES
 from vinl.robot.model import robot_spec
+from vinl.world.blocks import Blocks
+from vinl.world.clearance import block_distances, clearance
 from vinl.world.heightfield import BLOCK, WALL, HeightField
 
 # TF32 would round a position of 80 m to 6 cm: matrix products in full float32.
@@ -24,6 +27,17 @@ LEGS = FEET + SHANKS
 _NEAR = 2
 """A contact counts for a block when one lies within this many cells: the sides of a height field slope over one."""
 
+SHANK_LINE = np.linspace([0.0, 0.0, 0.0], [0.012, 0.0, -0.22], 8)
+"""Points along the axis of a shank, in the frame of its body [m]: the capsule of the primitives in aliengo.xml."""
+
+SHANK_REACH = 0.018
+"""A shank nearer than this to a block [m] touches it: the capsule's 0.0145 m and the error of the grid. Chosen so that
+the count agrees with MuJoCo C's contacts of the capsule on the same motion."""
+
+FOOT_REACH = 0.0265 + 0.02
+"""A foot whose middle is farther than this from any block [m] does not touch one: what it touches then is the slope
+that the height field has for the block's side, up to a cell wide."""
+
 
 class Ground(NamedTuple):
     """The height field on the device. It travels as an argument: as a constant it would be copied into the program.
@@ -32,11 +46,15 @@ class Ground(NamedTuple):
         normalised: (rows * columns,) heights scaled to [0, 1] as MuJoCo stores them.
         heights: (rows * columns,) heights [m].
         near: (rows * columns,) bit 1: a block lies near; bit 2: a wall lies near.
+        distance, top: (rows * columns,) distance from the nearest block and its height [m], for the shanks; one number
+            where the ground has no blocks.
     """
 
     normalised: Float[Array, " cells"]
     heights: Float[Array, " cells"]
     near: Array
+    distance: Float[Array, " cells"]
+    top: Float[Array, " cells"]
 
 
 class Body(NamedTuple):
@@ -75,6 +93,8 @@ class Simulation:
     Args:
         field: the ground; its frame's centre must be the world's origin.
         kp, kd: joint gains [N m / rad, N m s / rad].
+        blocks: those on the ground: the whole length of the shanks is held against them. The three spheres of a shank
+            leave gaps through which the edge of a block slips.
 
     Attributes:
         ground: the arrays that ``step`` needs.
@@ -82,7 +102,7 @@ class Simulation:
         model: the MuJoCo model.
     """
 
-    def __init__(self, field: HeightField, kp: float, kd: float) -> None:
+    def __init__(self, field: HeightField, kp: float, kd: float, blocks: Blocks | None = None) -> None:
         self.frame = field.frame
         rows, columns = field.frame.shape
         low, span = float(field.heights.min()), max(float(np.ptp(field.heights)), 0.1)
@@ -108,10 +128,15 @@ class Simulation:
         spheres = [self.model.geom(name).id for name in (*FOOT_GEOMS, *SHANK_SPHERES, *TRUNK_SPHERES)]
         self._spheres = np.array(spheres)
         self._trunk = self.model.body("trunk").id
+        self._calves = np.array([self.model.body(f"{leg}_calf").id for leg in LEG_NAMES])
+        self._has_blocks = blocks is not None and len(blocks) > 0
+        distance, top = np.zeros((1, 1)), np.zeros((1, 1))
+        if blocks is not None and len(blocks) > 0:
+            distance, top = block_distances(field.frame, blocks.boxes())
         near = _near(field, BLOCK) + 2 * _near(field, WALL)
         # committed arrays only: a mixture of committed and uncommitted ones compiles every program twice
         self.ground = jax.device_put(
-            Ground(jnp.asarray(normalised), jnp.asarray(field.heights.reshape(-1)), jnp.asarray(near.reshape(-1))),
+            Ground(*(jnp.asarray(x.reshape(-1)) for x in (normalised, field.heights, near, distance, top))),
             jax.devices()[0],
         )
         self._contact_rows = self._find_contact_rows()
@@ -158,7 +183,7 @@ class Simulation:
         touch, block, wall = (
             flags[:, : LEGS + TRUNK],
             flags[:, LEGS + TRUNK :][:, :LEGS],
-            flags[:, 2 * LEGS + TRUNK : -1],
+            flags[:, 2 * LEGS + TRUNK : 3 * LEGS + TRUNK],
         )
 
         def by_leg(spheres: Array) -> Array:
@@ -170,7 +195,7 @@ class Simulation:
             trunk=touch[:, LEGS:].any(1),
             trunk_down=flags[:, -1],
             foot_block=block[:, :FEET],
-            shank_block=by_leg(block),
+            shank_block=by_leg(block) | flags[:, 3 * LEGS + TRUNK : -1],
             foot_wall=wall[:, :FEET],
             shank_wall=by_leg(wall),
         )
@@ -195,12 +220,23 @@ class Simulation:
             raised = jnp.any(on[:LEGS] & ((up[:LEGS] < 0.7) | (z[:LEGS] > 0.02)), 1)
             near = ground.near[self.cell(data.geom_xpos[self._spheres[:LEGS], :2])]
             block, wall = raised & ((near & 1) > 0), raised & (near == 2)
+            feet_near, beside = self._at_blocks(ground, data)
+            block = jnp.concatenate([block[:FEET] & feet_near, block[FEET:]])
             down = jnp.any(on[LEGS:] & (up[LEGS:] > 0.5))
-            new = jnp.concatenate([jnp.any(on, 1), block, wall, down[None]])
+            new = jnp.concatenate([jnp.any(on, 1), block, wall, beside, down[None]])
             return (data.qpos, data.qvel, data.qacc_warmstart, flags | new, data.actuator_force), None
 
-        start = (qpos, qvel, warm, jnp.zeros(3 * LEGS + TRUNK + 1, bool), jnp.zeros(12))
+        start = (qpos, qvel, warm, jnp.zeros(3 * LEGS + TRUNK + FEET + 1, bool), jnp.zeros(12))
         return jax.lax.scan(substep, start, None, length=SUBSTEPS)[0]
+
+    def _at_blocks(self, ground: Ground, data: mjx.Data) -> tuple[Bool[Array, "4"], Bool[Array, "4"]]:
+        """By geometry: which feet of one robot may touch a block, and which shanks do, anywhere along their length."""
+        if not self._has_blocks:
+            return jnp.ones(FEET, bool), jnp.zeros(FEET, bool)
+        line = data.xpos[self._calves, None] + jnp.einsum("lij,kj->lki", data.xmat[self._calves], SHANK_LINE)
+        points = jnp.concatenate([data.geom_xpos[self._feet][:, None], line], 1)
+        free = clearance(jnp, ground.distance, ground.top, self.frame, points)
+        return free[:, 0] < FOOT_REACH, jnp.any(free[:, 1:] < SHANK_REACH, 1)
 
 
 def _near(field: HeightField, label: int) -> np.ndarray:

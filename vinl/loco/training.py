@@ -10,15 +10,19 @@ import torch
 
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config, dump_config
-from vinl.loco.config import LocoConfig
+from vinl.loco.config import LocoConfig, PpoConfig
 from vinl.loco.environment import LocoEnvironment
 from vinl.loco.vec_env import LocoVecEnv
+from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.commit import find_commit
 from vinl.policies.io import save_policy
 from vinl.rl.models import MapModel
-from vinl.rl.run_folder import RunFolder
+from vinl.rl.run_folder import CHECKPOINT, RunFolder
 from vinl.rl.runner import TrainingRunner
+
+WARMUP_RATE = 1e-3
+"""Learning rate while only the critic learns."""
 
 
 def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
@@ -103,8 +107,13 @@ def train_locomotor(
     resume = config is None
     if config is None:
         config = build_config(LocoConfig, run.open(), source=str(run.path / "config.yaml"))
-    else:
+    begun = resume and (run.path / CHECKPOINT).exists()
+    start = load_warm_start(config.from_policy, config) if config.from_policy and not begun else None
+    if not resume:
         run.create(dump_config(config))
+    if start is not None:
+        run.write_origin(start.describe())
+    origin = run.read_origin()
     torch.manual_seed(config.seed)
     torch.backends.cuda.matmul.allow_tf32 = True
     environment = LocoEnvironment(config)
@@ -113,24 +122,46 @@ def train_locomotor(
 
     def export(model: MapModel, samples: int) -> None:
         actor = model.export()
-        card = make_card(name or run.path.name, config, actor.describe(), samples, commit)
+        card = make_card(name or run.path.name, config, actor.describe(), samples, commit, origin)
         save_policy(run.policy, actor, card)
 
     def schedule(algorithm: Any, share: float) -> None:
+        teach_critic_first(algorithm, runner.current_learning_iteration, config.ppo)
         environment.set_rewards(config.anneal.rewards_at(share, config.rewards))
         if config.anneal.entropy is not None:
             algorithm.entropy_coef = config.anneal.blend(share, config.ppo.entropy, config.anneal.entropy)
 
     runner = TrainingRunner(env, rsl_rl_settings(config), run, device, export, describe_figures, schedule, save_every)
+    if start is not None:
+        runner.start_from(MapModel.own_names(start.actor), start.critic)
     if resume:
         runner.resume()
     return runner.train(iterations or config.iterations)
 
 
-def make_card(name: str, config: LocoConfig, network: dict[str, Any], samples: int, commit: str) -> PolicyCard:
-    """The card of a policy of this training."""
+def teach_critic_first(algorithm: Any, iteration: int, ppo: PpoConfig) -> None:
+    """Hold the actor still during ``critic_warmup`` and let it go afterwards; called before every iteration."""
+    if not ppo.critic_warmup or iteration > ppo.critic_warmup:
+        return
+    warming = iteration < ppo.critic_warmup
+    algorithm.get_policy().requires_grad_(not warming)
+    # without a divergence to steer by, rsl-rl leaves the learning rate alone
+    algorithm.desired_kl = None if warming else ppo.desired_kl
+    algorithm.learning_rate = WARMUP_RATE if warming else ppo.learning_rate
+    for group in algorithm.optimizer.param_groups:
+        group["lr"] = algorithm.learning_rate
+
+
+def make_card(
+    name: str,
+    config: LocoConfig,
+    network: dict[str, Any],
+    samples: int,
+    commit: str,
+    origin: dict[str, Any] | None = None,
+) -> PolicyCard:
+    """The card of a policy of this training; ``origin`` describes the policy that it started from."""
     action = {**describe_action(), "kp": config.kp, "kd": config.kd}
-    card = locomotion_card(
-        name, network, training=dump_config(config), seed=config.seed, samples=samples, commit=commit
-    )
+    training = {**dump_config(config), **({"origin": origin} if origin else {})}
+    card = locomotion_card(name, network, training=training, seed=config.seed, samples=samples, commit=commit)
     return PolicyCard(**{**vars(card), "action": action})

@@ -36,6 +36,11 @@ class MapModel(MLPModel):
     def _get_latent_dim(self) -> int:
         return PROPRIOCEPTION_SIZE + self._code_size
 
+    @staticmethod
+    def own_names(weights: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+        """The weights of a ``MapActor`` under this model's names."""
+        return {name.replace("actor.", "mlp.", 1): weight for name, weight in weights.items()}
+
     def export(self) -> MapActor:
         """The deterministic actor with the same weights, as policies are shipped."""
         widths = [layer.out_features for layer in self.mlp if isinstance(layer, nn.Linear)]

@@ -16,6 +16,7 @@ from vinl.config.errors import InputError
 CONFIG = "config.yaml"
 METRICS = "metrics.jsonl"
 CHECKPOINT = "checkpoint.pt"
+ORIGIN = "origin.json"
 
 
 class RunFolder:
@@ -65,6 +66,24 @@ class RunFolder:
         if not isinstance(config, dict):
             raise InputError(f"{file} is broken: it holds no settings")
         return config
+
+    def write_origin(self, origin: dict[str, Any]) -> None:
+        """Note where the networks of the run come from."""
+        write_text(self.path / ORIGIN, json.dumps(origin, indent=2) + "\n")
+
+    def read_origin(self) -> dict[str, Any] | None:
+        """Where the networks of the run come from; None: they were fresh.
+
+        Raises:
+            InputError: the note is broken.
+        """
+        file = self.path / ORIGIN
+        if not file.exists():
+            return None
+        try:
+            return json.loads(file.read_text(encoding="utf-8"))
+        except ValueError:
+            raise InputError(f"{file} is broken; remove it") from None
 
     def save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         """Replace the checkpoint, whole or not at all."""

@@ -72,6 +72,19 @@ class TrainingRunner(OnPolicyRunner):
         self.samples = 0
         self._stop = False
 
+    def start_from(self, actor: dict[str, torch.Tensor], critic: dict[str, torch.Tensor] | None) -> None:
+        """Take over trained weights; what they leave out, such as the actions' spread, stays as it was made.
+
+        Args:
+            actor: weights under the names of the actor model.
+            critic: under the names of the critic; None: it stays fresh.
+        """
+        self.alg.load(
+            {"actor_state_dict": actor, "critic_state_dict": critic},
+            {"actor": True, "critic": critic is not None},
+            False,
+        )
+
     def resume(self) -> bool:
         """Take up the folder's checkpoint, if there is one.
 

@@ -14,6 +14,7 @@ from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
+from vinl.world.joined import join_blocks, joined_share
 
 RESOLUTION = 0.05
 """Pitch of the height field [m]."""
@@ -40,6 +41,8 @@ class TerrainConfig:
         block_height: range of the blocks' heights [m] [paper IV-A: 0.1-0.2].
         tall_density: furniture-like tall boxes per m2 on ``blocks`` and ``walls`` tiles beyond the first level.
         start_clear: half-width of the square around the start without blocks [m].
+        joined: share of the blocks that touch or overlap another: end to end, at an angle or side by side.
+        wall_blocks: blocks on ``walls`` tiles, as a share of those on ``blocks`` tiles.
     """
 
     slope: float = 0.10
@@ -56,6 +59,8 @@ class TerrainConfig:
     block_height: tuple[float, float] = (0.1, 0.2)
     tall_density: float = 0.03
     start_clear: float = 0.8
+    joined: float = 0.0
+    wall_blocks: float = 0.0
 
     def __post_init__(self) -> None:
         if self.levels < 1 or self.columns < 1:
@@ -67,6 +72,8 @@ class TerrainConfig:
             raise InputError(f"terrain: block_height must be a rising positive range, got {self.block_height}")
         if self.block_density < 0 or self.tall_density < 0:
             raise InputError("terrain: densities must not be negative")
+        if not (0 <= self.joined <= 1 and 0 <= self.wall_blocks <= 1 and self.start_clear >= 0):
+            raise InputError("terrain: joined and wall_blocks must lie in [0, 1], start_clear must not be negative")
 
     def shares(self) -> dict[str, float]:
         """Share of every tile type, in the order of the columns."""
@@ -206,12 +213,12 @@ def build_terrain(config: TerrainConfig) -> Terrain:
                 boxes = [draw_tall(rng, here[::2], long=True), draw_tall(rng, here[1::2], long=False)]
                 # a wall is long: those that would reach into the start are left out
                 tall += [Boxes(b.rows + shift) for b in map(_off_the_start, boxes)]
+                if config.wall_blocks > 0:
+                    blocks.append(_tile_blocks(config, rng, k, middle, here, config.wall_blocks))
             else:
                 here = scatter_centres(rng, round(config.tall_density * TILE**2) if k else 0, 3.7, 1.5, 1.5, none)
                 tall.append(Boxes(draw_tall(rng, here, long=False).rows + shift))
-                count = round(config.block_density * TILE**2 * k / max(config.levels - 1, 1))
-                centres = scatter_centres(rng, count, TILE / 2, config.start_clear + 0.3, 0.45, here)
-                blocks.append(draw_blocks(rng, centres + middle, config.block_height))
+                blocks.append(_tile_blocks(config, rng, k, middle, here))
     all_blocks, all_tall = sum(blocks, Blocks.empty()), sum(tall, Boxes.empty())
     raise_boxes(ground, all_blocks.boxes(), BLOCK)
     raise_boxes(ground, all_tall, WALL)
@@ -222,6 +229,26 @@ def build_terrain(config: TerrainConfig) -> Terrain:
         here = slice(i - near, i + near + 1), slice(j - near, j + near + 1)
         starts[k, c, 2] = ground.heights[here][ground.labels[here] != WALL].max()
     return Terrain(ground, starts, kinds, all_blocks, all_tall)
+
+
+def _tile_blocks(
+    config: TerrainConfig,
+    rng: np.random.Generator,
+    level: int,
+    middle: Float[np.ndarray, "2"],
+    taken: Float[np.ndarray, "k 2"],
+    share: float = 1.0,
+) -> Blocks:
+    """The blocks of a tile: none on the first level, ``share`` of the full density on the last, none at the start."""
+    wanted = share * config.block_density * TILE**2 * level / max(config.levels - 1, 1)
+    partner = joined_share(config.joined)
+    clear = config.start_clear + 0.3  # half a block's diagonal more
+    centres = scatter_centres(rng, round(wanted / (1 + partner)), TILE / 2, clear, 0.45, taken)
+    blocks = draw_blocks(rng, centres, config.block_height)
+    if partner > 0:
+        joined = join_blocks(rng, blocks, partner).rows
+        blocks += Blocks(joined[np.abs(joined[:, :2]).max(1, initial=0) >= clear])
+    return Blocks(blocks.rows + np.array([*middle, 0, 0, 0, 0]))
 
 
 def _off_the_start(boxes: Boxes) -> Boxes:

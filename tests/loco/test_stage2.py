@@ -1,0 +1,196 @@
+"""Stage 2: it starts from trained networks, goes on after a stop, and counts what touches a block."""
+
+import json
+import shutil
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+import torch
+
+from vinl.cli.app import main
+from vinl.config.errors import InputError
+from vinl.config.loader import dump_config, load_config
+from vinl.loco import training
+from vinl.loco.config import CurriculumConfig, LocoConfig
+from vinl.loco.curriculum import next_levels
+from vinl.loco.environment import LocoEnvironment
+from vinl.loco.warm_start import load_warm_start
+from vinl.policies.card import locomotion_card
+from vinl.policies.io import find_policy, load_policy, save_policy
+from vinl.policies.networks import MapActor
+from vinl.robot.aliengo import FOOT_GEOMS, home_qpos
+from vinl.robot.model import robot_spec
+from vinl.world.terrain import build_terrain
+
+SMALL = [
+    "num_envs=16",
+    "iterations=3",
+    "ppo.steps=4",
+    "ppo.critic_warmup=1",
+    "terrain.levels=2",
+    "terrain.columns=2",
+    "terrain.blocks=1",
+    "terrain.walls=0",
+    "terrain.rough_slope=0",
+    "terrain.discrete=0",
+    "terrain.joined=0",
+    "terrain.tall_density=0",
+    "terrain.block_density=0.1",
+]
+FOOT = 0.0265
+
+
+@pytest.fixture(scope="module")
+def config() -> LocoConfig:
+    return load_config(LocoConfig, "loco/teacher", SMALL)
+
+
+@pytest.fixture(scope="module")
+def env(config) -> LocoEnvironment:
+    return LocoEnvironment(config)
+
+
+@pytest.fixture
+def compiled_once(env, monkeypatch):
+    """Trainings share one environment: to compile it takes most of the time."""
+
+    def fresh(config: LocoConfig) -> LocoEnvironment:
+        env.set_rewards(config.rewards)
+        env.state = jax.device_put(jax.jit(env._first_state)(jax.random.PRNGKey(config.seed)), jax.devices()[0])
+        return env
+
+    monkeypatch.setattr(training, "LocoEnvironment", fresh)
+
+
+def read_rows(folder):
+    return [json.loads(line) for line in (folder / "metrics.jsonl").read_text().splitlines()]
+
+
+def first_layer(folder):
+    return load_policy(folder).network.state_dict()["actor.0.weight"]
+
+
+def test_it_starts_from_a_policy_and_from_a_run_and_resumes(tmp_path, compiled_once):
+    one, two = tmp_path / "one", tmp_path / "two"
+    command = ["train-loco", "--stage", "2", "--device", "cpu", *SMALL]
+    assert main([*command, "--from", "vinl/rough", "--out", str(one)]) == 0
+    rows = read_rows(one)
+    assert [row["iteration"] for row in rows] == [1, 2, 3]
+    assert all(np.isfinite(list(row.values())).all() for row in rows)
+    assert rows[0]["action_std"] == 0.5 != rows[2]["action_std"]
+    assert rows[0]["learning_rate"] == training.WARMUP_RATE > rows[1]["learning_rate"]
+    card = load_policy(one).card
+    assert card.training["from_policy"] == "vinl/rough" and card.training["stage"] == 2
+    assert card.training["origin"]["policy"] == "rough" and not card.training["origin"]["critic"]
+    assert card.training["origin"]["samples"] == load_policy("rough").card.samples > 0
+    moved = (first_layer(one) - first_layer("rough")).abs().max()
+    assert 0 < moved < 0.02
+
+    assert main([*command, "--from", str(one), "--out", str(two), "--iterations", "1"]) == 0
+    old, new = (torch.load(f / "checkpoint.pt", weights_only=True)["algorithm"] for f in (one, two))
+    assert torch.equal(old["actor_state_dict"]["mlp.0.weight"], new["actor_state_dict"]["mlp.0.weight"])  # warming up
+    change = old["critic_state_dict"]["mlp.0.weight"] - new["critic_state_dict"]["mlp.0.weight"]
+    assert 0 < change.abs().max() < 0.05
+    assert new["actor_state_dict"]["distribution.std_param"].eq(0.5).all()
+    assert load_policy(two).card.training["origin"]["critic"]
+    shutil.rmtree(one)  # to resume needs nothing of the run that it started from
+    assert main(["train-loco", "--device", "cpu", "--resume", str(two), "--iterations", "3"]) == 0
+    assert [row["iteration"] for row in read_rows(two)] == [1, 2, 3]
+    assert load_policy(two).card.training["origin"]["policy"] == "one"
+
+
+def test_policies_that_do_not_fit_are_refused(tmp_path, config, capsys):
+    small, soft, eyes = tmp_path / "small", tmp_path / "soft", tmp_path / "eyes"
+    network = MapActor(actor=(8,))
+    save_policy(small, network, locomotion_card("small", network.describe()))
+    network = MapActor()
+    card = locomotion_card("soft", network.describe())
+    save_policy(soft, network, replace(card, action={**card.action, "kp": 20.0}))
+    shutil.copytree(find_policy("rough"), eyes)
+    data = json.loads((eyes / "card.json").read_text())
+    (eyes / "card.json").write_text(json.dumps({**data, "kind": "navigation"}))
+    for folder, words in ((small, "actor [8]"), (soft, "kp 20"), (eyes, "navigation"), (tmp_path / "none", "unknown")):
+        assert main(["train-loco", "--stage", "2", "--device", "cpu", "--from", str(folder), "--out", "out"]) == 2
+        error = capsys.readouterr().err
+        assert words in error and len(error.strip().splitlines()) == 1
+    assert main(["train-loco", "--resume", "x", "--from", "rough", "--device", "cpu"]) == 2
+    assert "--resume" in capsys.readouterr().err
+    assert main(["train-loco", "--stage", "2", "--config", "loco/rough", "--device", "cpu"]) == 2
+    assert "stage 1" in capsys.readouterr().err
+    with pytest.raises(InputError, match="max_contacts"):
+        CurriculumConfig(max_contacts=-1.0)
+    assert load_warm_start("rough", config).critic is None
+    assert dump_config(config)["from_policy"] == "rough"
+
+
+def test_promotion_can_be_bound_to_contacts():
+    for limit, contacts, level in ((1.0, 9.0, 5), (1.0, 30.0, 4), (None, 30.0, 5)):
+        new = next_levels(
+            CurriculumConfig(promote=0.7, max_contacts=limit),
+            10,
+            level=jnp.array([4]),
+            timeout=jnp.array([True]),
+            fallen=jnp.array([False]),
+            way=jnp.array([10.0]),
+            commanded=jnp.array([12.0]),
+            life=jnp.array([1.0]),
+            u=jnp.array([0.5]),
+            contacts=jnp.array([contacts]),
+        )
+        assert int(new[0]) == level
+
+
+def pose_feet(block, along: float, across: float, bottom: float) -> np.ndarray:
+    """A robot that looks across a block, its left front foot at a place in the block's frame [m], ``bottom`` [m] above
+    the ground; beside the block all four feet are level."""
+    model = robot_spec("spheres").compile()
+    data = mujoco.MjData(model)
+    x, y, yaw = block[:3]
+    data.qpos[:] = home_qpos(0, 0, 0, yaw + np.pi / 2)
+    mujoco.mj_kinematics(model, data)
+    foot = data.geom_xpos[model.geom(FOOT_GEOMS[0]).id]
+    c, s = np.cos(yaw), np.sin(yaw)
+    spot = np.array([x + c * along - s * across, y + s * along + c * across])
+    x, y = spot - foot[:2]
+    return home_qpos(float(x), float(y), float(bottom + FOOT - foot[2]), float(yaw + np.pi / 2))
+
+
+def test_feet_and_shanks_on_a_block_are_counted_and_those_beside_it_are_not(env):
+    rows = env.terrain.blocks.rows
+    apart = [row for row in rows if np.sort(np.linalg.norm(rows[:, :2] - row[:2], axis=1))[1] > 1.2]
+    assert len(apart) >= 4
+    poses, expected = [], []
+    for block in apart[:4]:
+        edge, high = block[4] / 2 + FOOT, block[5]
+        cases = (
+            (0.0, high - 0.002, True),  # stands on it
+            (0.0, high + 0.03, False),  # swings over it
+            (-edge - 0.03, -0.002, False),  # stands 3 cm before it
+            (-edge + 0.004, 0.0, True),  # stands against its side: at least the shank touches its edge
+        )
+        for across, bottom, touches in cases:
+            poses.append(pose_feet(block, 0.0, across, bottom))
+            expected.append(touches)
+    state = jax.jit(env._first_state)(jax.random.PRNGKey(0))
+    n = len(poses)
+    body = state.body._replace(qpos=jnp.asarray(np.stack(poses), jnp.float32), qvel=jnp.zeros((n, 18)))
+    quiet = {"life": state.life + 1, "step": jnp.zeros(n, jnp.int32), "push_left": jnp.full(n, 99, jnp.int32)}
+    env.state = jax.device_put(state._replace(body=body, **quiet), jax.devices()[0])
+    env.step(jnp.zeros((n, 12)))
+    assert np.asarray(env.state.hits > 0).tolist() == expected
+    measures = env.read_measures()
+    assert measures["reward/obstacle_contact"] < 0
+
+
+def test_starts_are_clear_of_blocks_and_walls(config):
+    terrain = replace(load_config(LocoConfig, "loco/teacher").terrain, levels=6, columns=20)
+    ground = build_terrain(terrain)
+    corners = np.concatenate([ground.blocks.boxes().corners().reshape(-1, 2), ground.tall.corners().reshape(-1, 2)])
+    free = config.randomisation.start_xy + 0.42  # half the standing robot's diagonal is 0.40
+    for start in ground.starts.reshape(-1, 3):
+        assert np.abs(corners - start[:2]).max(1).min() > free
+    assert {"walls", "blocks", "rough_slope"} <= set(ground.kinds)

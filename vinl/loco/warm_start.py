@@ -1,0 +1,101 @@
+"""Trained networks that a training starts from."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from torch import Tensor
+
+from vinl.config.errors import InputError
+from vinl.loco.config import LocoConfig
+from vinl.policies.io import find_policy, load_policy
+from vinl.policies.networks import MapActor
+from vinl.rl.run_folder import CHECKPOINT, RunFolder
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where the networks of a training come from: this goes onto the card of the new policy.
+
+    Attributes:
+        policy: name on the card of the old policy.
+        samples: that it had learned from.
+        commit: of the code that trained it.
+        weights: first digits of the SHA-256 of its actor's weights.
+        critic: whether the critic was taken over too.
+    """
+
+    policy: str
+    samples: int
+    commit: str
+    weights: str
+    critic: bool
+
+
+@dataclass(frozen=True, eq=False)
+class WarmStart:
+    """Weights under the names of ``MapActor`` and of rsl-rl's critic.
+
+    Attributes:
+        actor: weights of encoder and actor.
+        critic: weights of the critic; None: the policy came without one.
+        origin: where they come from.
+    """
+
+    actor: dict[str, Tensor]
+    critic: dict[str, Tensor] | None
+    origin: Origin
+
+    def describe(self) -> dict[str, object]:
+        """The origin as plain data."""
+        return asdict(self.origin)
+
+
+def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
+    """The networks of a policy (actor alone) or of a training run (actor and critic).
+
+    Args:
+        name_or_path: ``"rough"``, ``"vinl/rough"``, a policy folder or the folder of a training run.
+        config: of the training that shall start from them.
+
+    Raises:
+        InputError: no such policy, one of another kind, of other sizes or with other joint gains.
+    """
+    policy = load_policy(name_or_path)
+    card, network, p = policy.card, policy.network, config.ppo
+    wanted = MapActor(encoder=p.encoder, code=p.code, actor=p.actor).describe()
+    if not isinstance(network, MapActor) or network.describe() != wanted:
+        raise InputError(
+            f"--from {name_or_path}: its network {_list(network.describe())} is not that of this training "
+            f"{_list(wanted)}; set ppo.encoder, ppo.code and ppo.actor to its sizes, or start from another policy"
+        )
+    gains = float(card.action["kp"]), float(card.action["kd"])
+    if gains != (config.kp, config.kd):
+        raise InputError(
+            f"--from {name_or_path}: it was trained with kp {gains[0]:g} and kd {gains[1]:g}; set kp and kd"
+        )
+    actor = {name: weight.clone() for name, weight in network.state_dict().items()}
+    digest = hashlib.sha256(b"".join(weight.numpy().tobytes() for weight in actor.values())).hexdigest()[:12]
+    critic = _load_critic(name_or_path, config)
+    return WarmStart(actor, critic, Origin(card.name, card.samples, card.commit, digest, critic is not None))
+
+
+def _load_critic(name_or_path: str, config: LocoConfig) -> dict[str, Tensor] | None:
+    """The critic of a run; None for a policy folder, and where the new critic has other widths."""
+    folder = Path(name_or_path)
+    if not (folder / CHECKPOINT).is_file() or find_policy(name_or_path) != folder / "policy":
+        return None
+    checkpoint = RunFolder(folder).load_checkpoint() or {}
+    critic = checkpoint.get("algorithm", {}).get("critic_state_dict")
+    if not isinstance(critic, dict):
+        raise InputError(
+            f"{folder / CHECKPOINT} holds no critic; give {folder / 'policy'} to start from the actor alone"
+        )
+    widths = tuple(w.shape[0] for name, w in critic.items() if name.startswith("mlp.") and w.ndim == 2)
+    return critic if widths == (*config.ppo.critic, 1) else None
+
+
+def _list(description: dict[str, object]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in description.items())
