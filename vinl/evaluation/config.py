@@ -38,7 +38,7 @@ class OracleConfig:
 
 @dataclass(frozen=True)
 class EvaluationConfig:
-    """The rules of the paper's protocol [paper, IV; facts/locomotion 6], and ours where it names none.
+    """The rules of the paper's protocol [paper, IV; ViNL code], and ours where it names none.
 
     Attributes:
         time_limit: length of an episode [s] [paper code: 250 decisions at 2 Hz].

@@ -79,7 +79,7 @@ class ContactReader:
 
     def breaks_paper_rule(self) -> bool:
         """The paper's own count, from the last physics step of the control step: any foot higher than 0.05 m with any
-        vertical force, or with a horizontal force of five times the vertical one [facts/locomotion 2]."""
+        vertical force, or with a horizontal force of five times the vertical one [ViNL code]."""
         for foot, (fx, fy, fz) in zip(self._feet, self._forces.tolist(), strict=True):
             if fx == 0.0 and fy == 0.0 and fz == 0.0:
                 continue

@@ -38,7 +38,7 @@ class EpisodeRecord:
         foot_block_steps, foot_wall_steps: the same for blocks and for walls with furniture.
         leg_contact_steps: a hip, thigh or shank on a block or a wall.
         trunk_contact_steps: the trunk on a block or a wall.
-        paper_foot_steps: the paper's own rule, from foot height and force [facts/locomotion 2].
+        paper_foot_steps: the paper's own rule, from foot height and force [ViNL code].
         speed_rmse: root mean square of the error of the horizontal velocity [m/s].
         yaw_rate_rmse: the same of the yaw rate [rad/s].
         note: why start and goal are nearer than asked for, if they are.

@@ -29,7 +29,7 @@ class InterruptedRunError(Exception):
 
 
 def goal_in_heading_frame(pose: Float[np.ndarray, "n 3"], goal: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
-    """Straight distance to the goal [m], cosine and sine of its bearing, left positive [facts/locomotion 6.5]."""
+    """Straight distance to the goal [m], cosine and sine of its bearing, left positive [ViNL code]."""
     to = goal - pose[:, :2]
     bearing = np.arctan2(to[:, 1], to[:, 0]) - pose[:, 2]
     return np.stack([np.linalg.norm(to, axis=1), np.cos(bearing), np.sin(bearing)], 1)

@@ -47,7 +47,7 @@ TRUNK_SPHERES = tuple(f"trunk{k}" for k in range(6))
 """Sphere set: the trunk."""
 
 LENGTH, WIDTH = 0.70, 0.38
-"""Rectangle that the standing robot covers on the floor [m]: trunk 0.65 and feet 0.313 apart [facts: measured on the
+"""Rectangle that the standing robot covers on the floor [m]: trunk 0.65 and feet 0.313 apart [measured on the
 maker's meshes], with some room for the swing of the legs."""
 
 
