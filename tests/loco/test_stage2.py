@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 import torch
+from tensordict import TensorDict
 
 from vinl.cli.app import main
 from vinl.config.errors import InputError
@@ -21,9 +22,11 @@ from vinl.loco.environment import LocoEnvironment
 from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import locomotion_card
 from vinl.policies.io import find_policy, load_policy, save_policy
-from vinl.policies.networks import MapActor
+from vinl.policies.networks import MapActor, build_network
+from vinl.rl.models import BlindModel
 from vinl.robot.aliengo import FOOT_GEOMS, home_qpos
 from vinl.robot.model import robot_spec
+from vinl.robot.observation import OBSERVATION_SIZE
 from vinl.world.terrain import build_terrain
 
 SMALL = [
@@ -142,6 +145,24 @@ def test_promotion_can_be_bound_to_contacts():
             contacts=jnp.array([contacts]),
         )
         assert int(new[0]) == level
+
+
+def test_the_blind_actor_sees_no_map_and_ships_what_it_learned():
+    config = load_config(LocoConfig, "loco/blind")
+    assert config.stage == 2 and config.from_policy is None
+    assert config.terrain == load_config(LocoConfig, "loco/teacher").terrain
+    settings = training.rsl_rl_settings(config)["actor"]
+    observation = TensorDict({"policy": torch.randn(3, OBSERVATION_SIZE)}, batch_size=[3])
+    del settings["class_name"]
+    model = BlindModel(observation, {"actor": ["policy"]}, "actor", 12, **settings)
+    network = model.export()
+    shipped = build_network(network.describe())
+    shipped.load_state_dict(network.state_dict())
+    blank = observation["policy"].clone()
+    blank[:, 48:] = 0
+    assert torch.allclose(model(observation), shipped(blank), atol=1e-6)
+    with pytest.raises(InputError, match="MapActor"):
+        load_warm_start("rough", config)
 
 
 def pose_feet(block, along: float, across: float, bottom: float) -> np.ndarray:

@@ -179,6 +179,7 @@ class PpoConfig:
         init_std: standard deviation of the actions at the start, also after ``from_policy``.
         critic_warmup: in so many first updates only the critic learns: one that starts afresh beside a trained actor
             would otherwise teach it nonsense.
+        map: whether the actor sees the height scan; the critic always does.
         actor, critic, encoder: widths of the hidden layers.
         code: size of the map code that the encoder makes of the height scan [paper III-A].
     """
@@ -196,6 +197,7 @@ class PpoConfig:
     max_grad_norm: float = 1.0
     init_std: float = 1.0
     critic_warmup: int = 0
+    map: bool = True
     actor: tuple[int, ...] = (512, 256, 128)
     critic: tuple[int, ...] = (512, 256, 128)
     encoder: tuple[int, ...] = (128, 64)

@@ -17,7 +17,7 @@ from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.commit import find_commit
 from vinl.policies.io import save_policy
-from vinl.rl.models import MapModel
+from vinl.rl.models import BlindModel, MapModel, training_names
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
 from vinl.rl.runner import TrainingRunner
 
@@ -28,15 +28,16 @@ WARMUP_RATE = 1e-3
 def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
     """Our PPO settings under rsl-rl's names."""
     p = config.ppo
+    sight: dict[str, Any] = {"class_name": "vinl.rl.models:BlindModel"}
+    if p.map:
+        sight = {"class_name": "vinl.rl.models:MapModel", "encoder": list(p.encoder), "code": p.code}
     return {
         "num_steps_per_env": p.steps,
         "obs_groups": {"actor": ["policy"], "critic": ["critic"]},
         "actor": {
-            "class_name": "vinl.rl.models:MapModel",
+            **sight,
             "hidden_dims": list(p.actor),
             "activation": "elu",
-            "encoder": list(p.encoder),
-            "code": p.code,
             "distribution_cfg": {"class_name": "GaussianDistribution", "init_std": p.init_std},
         },
         "critic": {"class_name": "MLPModel", "hidden_dims": list(p.critic), "activation": "elu"},
@@ -120,7 +121,7 @@ def train_locomotor(
     env = LocoVecEnv(environment, device)
     commit = find_commit()
 
-    def export(model: MapModel, samples: int) -> None:
+    def export(model: MapModel | BlindModel, samples: int) -> None:
         actor = model.export()
         card = make_card(name or run.path.name, config, actor.describe(), samples, commit, origin)
         save_policy(run.policy, actor, card)
@@ -133,7 +134,7 @@ def train_locomotor(
 
     runner = TrainingRunner(env, rsl_rl_settings(config), run, device, export, describe_figures, schedule, save_every)
     if start is not None:
-        runner.start_from(MapModel.own_names(start.actor), start.critic)
+        runner.start_from(training_names(start.actor), start.critic)
     if resume:
         runner.resume()
     return runner.train(iterations or config.iterations)

@@ -11,7 +11,7 @@ from torch import Tensor
 from vinl.config.errors import InputError
 from vinl.loco.config import LocoConfig
 from vinl.policies.io import find_policy, load_policy
-from vinl.policies.networks import MapActor
+from vinl.policies.networks import BlindActor, MapActor
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
 
 
@@ -36,7 +36,7 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class WarmStart:
-    """Weights under the names of ``MapActor`` and of rsl-rl's critic.
+    """Weights under the names of the shipped actors and of rsl-rl's critic.
 
     Attributes:
         actor: weights of encoder and actor.
@@ -65,11 +65,12 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
     """
     policy = load_policy(name_or_path)
     card, network, p = policy.card, policy.network, config.ppo
-    wanted = MapActor(encoder=p.encoder, code=p.code, actor=p.actor).describe()
-    if not isinstance(network, MapActor) or network.describe() != wanted:
+    fresh = MapActor(encoder=p.encoder, code=p.code, actor=p.actor) if p.map else BlindActor(actor=p.actor)
+    wanted = fresh.describe()
+    if network.describe() != wanted:
         raise InputError(
             f"--from {name_or_path}: its network {_list(network.describe())} is not that of this training "
-            f"{_list(wanted)}; set ppo.encoder, ppo.code and ppo.actor to its sizes, or start from another policy"
+            f"{_list(wanted)}; set ppo.map, ppo.encoder, ppo.code and ppo.actor to its own, or give another policy"
         )
     gains = float(card.action["kp"]), float(card.action["kd"])
     if gains != (config.kp, config.kd):

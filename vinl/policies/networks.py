@@ -77,6 +77,28 @@ class MapActor(PolicyNetwork):
         return self.actor(torch.cat([observation[..., : self.proprioception], code], -1))
 
 
+class BlindActor(PolicyNetwork):
+    """A locomotion actor that observes the height scan and leaves it unused: the baseline without a map."""
+
+    def __init__(
+        self,
+        proprioception: int = PROPRIOCEPTION_SIZE,
+        scan: int = SCAN_SIZE,
+        actor: Sequence[int] = (512, 256, 128),
+        actions: int = 12,
+    ) -> None:
+        """Sizes of the parts; ``actor`` are the widths of the hidden layers, ``scan`` numbers are left out."""
+        super().__init__()
+        self.arguments = {"proprioception": proprioception, "scan": scan, "actor": list(actor), "actions": actions}
+        self.proprioception = proprioception
+        self.observation_size, self.action_size = proprioception + scan, actions
+        self.actor = mlp([proprioception, *actor, actions], nn.ELU)
+
+    def forward(self, observation: Float[Tensor, "n observation"]) -> Float[Tensor, "n actions"]:
+        """Scaled observations in the order of ``robot.observation.TABLE`` to actions."""
+        return self.actor(observation[..., : self.proprioception])
+
+
 def mlp(sizes: Sequence[int], activation: Callable[[], nn.Module]) -> nn.Sequential:
     """Linear layers through ``sizes`` with ``activation`` between them and none at the end."""
     layers: list[nn.Module] = []

@@ -10,7 +10,7 @@ from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 from torch import nn
 
-from vinl.policies.networks import MapActor, mlp
+from vinl.policies.networks import BlindActor, MapActor, mlp
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE
 
 
@@ -36,15 +36,42 @@ class MapModel(MLPModel):
     def _get_latent_dim(self) -> int:
         return PROPRIOCEPTION_SIZE + self._code_size
 
-    @staticmethod
-    def own_names(weights: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-        """The weights of a ``MapActor`` under this model's names."""
-        return {name.replace("actor.", "mlp.", 1): weight for name, weight in weights.items()}
-
     def export(self) -> MapActor:
         """The deterministic actor with the same weights, as policies are shipped."""
-        widths = [layer.out_features for layer in self.mlp if isinstance(layer, nn.Linear)]
-        actor = MapActor(encoder=self._encoder_sizes[1:-1], code=self._code_size, actor=widths[:-1], actions=widths[-1])
-        weights = {k: v for k, v in self.state_dict().items() if k.startswith(("encoder.", "mlp."))}
-        actor.load_state_dict({k.replace("mlp.", "actor.", 1): v for k, v in weights.items()})
+        *hidden, actions = _widths(self)
+        actor = MapActor(encoder=self._encoder_sizes[1:-1], code=self._code_size, actor=hidden, actions=actions)
+        actor.load_state_dict(_shipped_names(self))
         return actor
+
+
+class BlindModel(MLPModel):
+    """rsl-rl actor that sees no map: proprioception alone goes into the MLP."""
+
+    def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> torch.Tensor:
+        """Proprioception, (n, 48)."""
+        return super().get_latent(obs, masks, hidden_state)[..., :PROPRIOCEPTION_SIZE]
+
+    def _get_latent_dim(self) -> int:
+        return PROPRIOCEPTION_SIZE
+
+    def export(self) -> BlindActor:
+        """The deterministic actor with the same weights, as policies are shipped."""
+        *hidden, actions = _widths(self)
+        actor = BlindActor(actor=hidden, actions=actions)
+        actor.load_state_dict(_shipped_names(self))
+        return actor
+
+
+def training_names(weights: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    """The weights of a shipped actor under the names of its model for training."""
+    return {name.replace("actor.", "mlp.", 1): weight for name, weight in weights.items()}
+
+
+def _shipped_names(model: nn.Module) -> dict[str, torch.Tensor]:
+    weights = {k: v for k, v in model.state_dict().items() if k.startswith(("encoder.", "mlp."))}
+    return {k.replace("mlp.", "actor.", 1): v for k, v in weights.items()}
+
+
+def _widths(model: MLPModel) -> list[int]:
+    """Outputs of the linear layers of the MLP."""
+    return [layer.out_features for layer in model.mlp if isinstance(layer, nn.Linear)]
