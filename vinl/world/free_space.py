@@ -12,7 +12,8 @@ from vinl.config.errors import InputError
 from vinl.world.floorplan import FloorPlan, measure_clearance
 
 FOOTPRINT_RADIUS = 0.22
-"""Radius that the floor is eroded by [m]: AlienGo's agent radius in the paper's navigator [paper, IV; habitat-lab, branch vinl]."""
+"""Radius that the floor is eroded by [m]: AlienGo's agent radius in the paper's navigator
+[paper, IV; habitat-lab, branch vinl]."""
 
 FIT_RADIUS = 0.27
 """Radius for which the robot walks through a gap without touching its sides [m]: half its width over the legs (0.38 m),
