@@ -43,8 +43,8 @@ class PolicyNetwork(nn.Module):
 class MapActor(PolicyNetwork):
     """The deterministic locomotion actor: the height scan becomes a short code, proprioception + code an action.
 
-    Parameters are named ``encoder.*`` and ``actor.*``. Sizes and activations are the paper's [paper III-A, facts:
-    locomotion 5.1]: ReLU inside the encoder and none at its end, ELU inside the actor.
+    Parameters are named ``encoder.*`` and ``actor.*``. Sizes and activations are the paper's [paper III-A; ViNL
+    code]: ReLU inside the encoder and none at its end, ELU inside the actor.
     """
 
     def __init__(
