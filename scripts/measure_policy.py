@@ -20,8 +20,9 @@ from vinl.policies.card import read_card, write_card
 
 LOCO = {
     "flat": "eval-loco --terrain flat --robots 64 --seconds 20 --seed 0",
-    "flat_sideways": "eval-loco --terrain flat --robots 64 --seconds 20 --seed 0 --sideways",
+    "flat_forward_only": "eval-loco --terrain flat --robots 64 --seconds 20 --seed 0 --forward-only",
     "rough": "eval-loco --terrain rough --robots 192 --seconds 20 --seed 0",
+    "rough_forward_only": "eval-loco --terrain rough --robots 192 --seconds 20 --seed 0 --forward-only",
     "blocks": "eval-loco --terrain blocks --density 1.0 --robots 64 --seconds 20 --seed 0",
 }
 CHAIN = {

@@ -28,8 +28,8 @@ class Options:
     """Blocks per m2, for blocks."""
     level: int | None = None
     """Level of all robots, 0 to 9, for rough; 1 to 9 by turns if not given."""
-    sideways: bool = False
-    """Command sideways velocities too. Without it, only forward (or back) and turning, as a navigator commands."""
+    forward_only: bool = False
+    """No sideways velocities: only forward (or back) and turning, as a navigator commands."""
     workers: int | None = None
     """Processes; the number of cores by default. Results do not depend on it."""
     device: str = "cpu"
@@ -63,7 +63,7 @@ def main(argv: list[str]) -> int:
             options.seed,
             options.density,
             options.level,
-            options.sideways,
+            options.forward_only,
             workers,
             progress.show,
         )

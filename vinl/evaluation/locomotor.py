@@ -75,15 +75,15 @@ class LocomotorResults:
     wall_seconds: float
 
 
-def command_ranges(policy: Policy, sideways: bool = False) -> CommandRanges:
-    """What the policy was trained for, at most +-1 m/s and +-1 rad/s; sideways velocities only if asked for."""
+def command_ranges(policy: Policy, forward_only: bool = False) -> CommandRanges:
+    """What the policy was trained for, at most +-1 m/s and +-1 rad/s; without sideways velocities if ``forward_only``."""
     trained = policy.card.training.get("commands", {})
 
     def cut(name: str) -> tuple[float, float]:
         low, high = trained.get(name, (-_COMMAND_LIMIT, _COMMAND_LIMIT))
         return max(float(low), -_COMMAND_LIMIT), min(float(high), _COMMAND_LIMIT)
 
-    left = cut("left") if sideways else (0.0, 0.0)
+    left = (0.0, 0.0) if forward_only else cut("left")
     return CommandRanges(cut("forward"), left, cut("yaw_rate"), float(trained.get("min_speed", 0.2)))
 
 
@@ -95,7 +95,7 @@ def evaluate_locomotor(
     seed: int = 0,
     density: float = 1.0,
     level: int | None = None,
-    sideways: bool = False,
+    forward_only: bool = False,
     workers: int = 1,
     on_progress: Callable[[str, int, int], None] = lambda *_: None,
 ) -> LocomotorResults:
@@ -109,7 +109,7 @@ def evaluate_locomotor(
         seed: of terrain, starts and commands.
         density: blocks per m2, for ``blocks``.
         level: level of all robots, for ``rough``; 1 to 9 by turns if None.
-        sideways: command sideways velocities too; a navigator only goes forward and turns.
+        forward_only: no sideways velocities: forward, back and turning, as a navigator commands.
         workers: processes; results do not depend on it.
         on_progress: called with ``"robot"``, robots done and robots in all.
 
@@ -120,7 +120,7 @@ def evaluate_locomotor(
     check_senses(policy)
     action = policy.card.action
     ground = GroundConfig(terrain, density, level, seed, float(action["kp"]), float(action["kd"]))
-    ranges, began, done = command_ranges(policy, sideways), time.perf_counter(), 0
+    ranges, began, done = command_ranges(policy, forward_only), time.perf_counter(), 0
 
     def count() -> None:
         nonlocal done
