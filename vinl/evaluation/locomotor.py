@@ -76,7 +76,7 @@ class LocomotorResults:
 
 
 def command_ranges(policy: Policy, forward_only: bool = False) -> CommandRanges:
-    """What the policy was trained for, at most +-1 m/s and +-1 rad/s; without sideways velocities if ``forward_only``."""
+    """What the policy was trained for, at most +-1 m/s and +-1 rad/s; ``forward_only`` leaves sideways ones out."""
     trained = policy.card.training.get("commands", {})
 
     def cut(name: str) -> tuple[float, float]:
