@@ -8,8 +8,8 @@ import numpy as np
 
 from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
-from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan, frame_around
-from vinl.world.readers.polygons import paint_polygon, place_label
+from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan
+from vinl.world.readers.polygons import paint_inside, place_label
 from vinl.world.readers.segments import Opening, Wall, raise_walls
 
 SCHEMA = "vinl/floorplan/1"
@@ -28,13 +28,7 @@ def build_own_plan(entries: dict[str, Any], name: str, source: str) -> FloorPlan
     polygons = [np.array(room["outline"], dtype=float).reshape(-1, 2) for room in entries["rooms"]]
     if not polygons or not walls:
         raise InputError(f"{source}: the plan has no rooms or no walls")
-    every = np.concatenate([*polygons, *[np.array([w.start, w.end]) for w in walls]])
-    if not np.isfinite(every).all():
-        raise InputError(f"{source}: a wall or a room has a coordinate that is not a number")
-    frame = frame_around(every.min(0), every.max(0), source)
-    inside = np.zeros(frame.shape, dtype=bool)
-    for polygon in polygons:
-        inside |= paint_polygon(polygon, frame)
+    frame, inside = paint_inside(polygons, walls, source)
     # doorways lie in the walls, between the rooms' outlines, and belong to the inside
     boxes = Boxes(raise_walls(walls, openings))
     labels = tuple(

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 import shapely
 from jaxtyping import Bool, Float
 from shapely.ops import polylabel
 
+from vinl.config.errors import InputError
+from vinl.world.floorplan import frame_around
 from vinl.world.grid import GridFrame
+from vinl.world.readers.segments import Wall
 
 
 def paint_polygon(polygon: Float[np.ndarray, "k 2"], frame: GridFrame) -> Bool[np.ndarray, "rows columns"]:
@@ -23,3 +28,21 @@ def place_label(polygon: Float[np.ndarray, "k 2"]) -> tuple[float, float]:
     shape = shapely.Polygon(polygon)
     point = polylabel(shape, 0.1) if shape.is_valid and shape.area > 0 else shape.centroid
     return float(point.x), float(point.y)
+
+
+def paint_inside(
+    polygons: Sequence[Float[np.ndarray, "_ 2"]], walls: Iterable[Wall], source: str
+) -> tuple[GridFrame, Bool[np.ndarray, "rows columns"]]:
+    """The grid around rooms and walls, and which of its cells lie in a room.
+
+    Raises:
+        InputError: a coordinate is not finite.
+    """
+    every = np.concatenate([*polygons, *[np.array([w.start, w.end]) for w in walls]])
+    if not np.isfinite(every).all():
+        raise InputError(f"{source}: a wall or a room has a coordinate that is not a number")
+    frame = frame_around(every.min(0), every.max(0), source)
+    inside = np.zeros(frame.shape, dtype=bool)
+    for polygon in polygons:
+        inside |= paint_polygon(polygon, frame)
+    return frame, inside

@@ -10,8 +10,8 @@ import numpy as np
 
 from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
-from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan, frame_around
-from vinl.world.readers.polygons import paint_polygon, place_label
+from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan
+from vinl.world.readers.polygons import paint_inside, place_label
 from vinl.world.readers.segments import Opening, Wall, raise_walls
 
 WALL_THICKNESS = 0.1
@@ -42,13 +42,7 @@ def build_procthor_plan(house: dict[str, Any], name: str, source: str, sizes_fil
         raise InputError(f"{source}: the house has no rooms or no walls")
     walls = {str(wall["id"]): _read_wall(wall) for wall in house["walls"]}
     openings = [o for door in house.get("doors", []) if (o := _read_opening(door, walls)) is not None]
-    every = np.concatenate([*polygons, *[np.array([w.start, w.end]) for w in walls.values()]])
-    if not np.isfinite(every).all():
-        raise InputError(f"{source}: a wall or a room has a coordinate that is not a number")
-    frame = frame_around(every.min(0), every.max(0), source)
-    inside = np.zeros(frame.shape, dtype=bool)
-    for polygon in polygons:
-        inside |= paint_polygon(polygon, frame)
+    frame, inside = paint_inside(polygons, walls.values(), source)
     boxes = Boxes(raise_walls(list(walls.values()), openings))
     furniture = Boxes(_read_objects(house.get("objects", []), _read_sizes(sizes_file)))
     labels = tuple(
