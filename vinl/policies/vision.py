@@ -1,0 +1,146 @@
+"""Networks that turn a depth image into a short vector: the paper's small CNN and the navigator's ResNet-18."""
+
+from __future__ import annotations
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+from torch.nn import functional
+
+_SMALL = 80
+"""Images lower than this get a smaller first convolution: 8 x 8 with stride 4 would leave nothing of the map."""
+
+_LARGE = 128
+"""Images at least this large are averaged over 2 x 2 pixels before the ResNet [ViNL resnet_policy.py]."""
+
+_COMPRESSED = 2048
+"""Numbers that the ResNet's map is compressed to [ViNL resnet_policy.py]."""
+
+
+class Vision(nn.Module):
+    """An image with values in [0, 1] to a vector. Under autocast the convolutions run in the reduced type.
+
+    Attributes:
+        layers: from (n, 1, H, W) to (n, size), ReLU at the end.
+        channels_last: whether the images go in with channels last, which is faster without norms in between.
+    """
+
+    layers: nn.Sequential
+    channels_last: bool = False
+
+    def forward(self, images: Float[Tensor, "n height width"]) -> Float[Tensor, "n size"]:
+        """Feature vectors, float32 or the type of autocast."""
+        kind = images.device.type
+        wanted = torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else next(self.parameters()).dtype
+        images = images.to(wanted)
+        # one channel: (n, H, W, 1) turned round has the strides of "channels last" without a copy
+        return self.layers(images[..., None].permute(0, 3, 1, 2) if self.channels_last else images[:, None])
+
+
+class SmallCnn(Vision):
+    """Three convolutions and a linear layer [ViNL simple_cnn.py: 32 8x8 s4, 64 4x4 s2, 32 3x3, no ReLU after it].
+
+    Images lower than 80 pixels get a first convolution of 5 x 5 with stride 2, and padding.
+    """
+
+    channels_last = True
+
+    def __init__(self, height: int, width: int, size: int) -> None:
+        super().__init__()
+        small = min(height, width) < _SMALL
+        first = nn.Conv2d(1, 32, 5, 2, 2) if small else nn.Conv2d(1, 32, 8, 4)
+        pad = 1 if small else 0
+        maps = nn.Sequential(
+            first,
+            nn.ReLU(),
+            nn.Conv2d(32, 64, 4, 2, pad),
+            nn.ReLU(),
+            nn.Conv2d(64, 32, 3, 1, pad),
+            nn.Flatten(),
+        )
+        numbers = _count(maps, height, width)
+        self.layers = nn.Sequential(*maps, nn.Linear(numbers, size), nn.ReLU())
+        _start_weights(self)
+
+
+class ResNet18(Vision):
+    """ResNet-18 with GroupNorm and a compressed map [ViNL resnet_policy.py and resnet.py]."""
+
+    def __init__(self, height: int, width: int, size: int, planes: int = 32) -> None:
+        super().__init__()
+        p = planes
+        maps = nn.Sequential(
+            nn.Conv2d(1, p, 7, 2, 3, bias=False),
+            GroupNorm(16, p),
+            nn.ReLU(),
+            nn.MaxPool2d(3, 2, 1),
+            *(_Block(p, p, 1), _Block(p, p, 1)),
+            *(_Block(p, 2 * p, 2), _Block(2 * p, 2 * p, 1)),
+            *(_Block(2 * p, 4 * p, 2), _Block(4 * p, 4 * p, 1)),
+            *(_Block(4 * p, 8 * p, 2), _Block(8 * p, 8 * p, 1)),
+        )
+        self.pool = 2 if min(height, width) >= _LARGE else 1
+        cells = _count(maps, height // self.pool, width // self.pool) // (8 * p)
+        channels = max(round(_COMPRESSED / cells), 1)
+        self.layers = nn.Sequential(
+            *maps,
+            nn.Conv2d(8 * p, channels, 3, 1, 1, bias=False),
+            GroupNorm(1, channels),
+            nn.ReLU(),
+            nn.Flatten(),
+            nn.Linear(channels * cells, size),
+            nn.ReLU(),
+        )
+        _start_weights(self)
+
+    def forward(self, images: Float[Tensor, "n height width"]) -> Float[Tensor, "n size"]:
+        """Feature vectors, float32 or the type of autocast."""
+        return super().forward(functional.avg_pool2d(images, self.pool) if self.pool > 1 else images)
+
+
+class GroupNorm(nn.GroupNorm):
+    """Group normalisation in the type of its input: autocast would turn maps to float32 and back around each one.
+
+    The sums inside are float32 whatever the type.
+    """
+
+    def forward(self, input: Tensor) -> Tensor:
+        """Normalised maps of the same shape and type."""
+        with torch.autocast(input.device.type, enabled=False):
+            weight, bias = self.weight.to(input.dtype), self.bias.to(input.dtype)
+            return functional.group_norm(input, self.num_groups, weight, bias, self.eps)
+
+
+class _Block(nn.Module):
+    """Two convolutions 3 x 3 beside a shortcut."""
+
+    def __init__(self, before: int, after: int, stride: int) -> None:
+        super().__init__()
+        self.path = nn.Sequential(
+            nn.Conv2d(before, after, 3, stride, 1, bias=False),
+            GroupNorm(16, after),
+            nn.ReLU(),
+            nn.Conv2d(after, after, 3, 1, 1, bias=False),
+            GroupNorm(16, after),
+        )
+        self.shortcut: nn.Module = nn.Identity()
+        if stride > 1 or before != after:
+            self.shortcut = nn.Sequential(nn.Conv2d(before, after, 1, stride, bias=False), GroupNorm(16, after))
+
+    def forward(self, x: Tensor) -> Tensor:
+        return functional.relu(self.path(x) + self.shortcut(x))
+
+
+def _count(maps: nn.Module, height: int, width: int) -> int:
+    """Numbers in the maps of one image."""
+    with torch.no_grad():
+        return maps(torch.zeros(1, 1, height, width)).numel()
+
+
+def _start_weights(network: nn.Module) -> None:
+    """He's start for convolutions and linear layers, zero biases [ViNL code]."""
+    for layer in network.modules():
+        if isinstance(layer, nn.Conv2d | nn.Linear):
+            nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
+            if layer.bias is not None:
+                nn.init.zeros_(layer.bias)
