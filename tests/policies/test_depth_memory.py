@@ -3,7 +3,9 @@
 import pytest
 import torch
 
+from vinl.config.errors import InputError
 from vinl.policies.depth_memory import DepthMemory
+from vinl.policies.networks import build_network
 
 
 @pytest.fixture(autouse=True)
@@ -81,3 +83,17 @@ def test_unknown_parts_are_refused():
         small("eye")
     with pytest.raises(ValueError, match="memory"):
         small("cnn", "gru")
+
+
+def test_the_student_is_rebuilt_from_its_description():
+    network = build_network({"class": "DepthActor", "vision": "none", "hidden": 8, "actor": [16, 8]})
+    again = build_network(network.describe())
+    again.load_state_dict(network.state_dict())
+    vector, fresh = torch.randn(3, 2, 48), torch.zeros(3, 2).bool()
+    action, state = again(None, vector, again.initial_state(2), fresh)
+    assert action.shape == (3, 2, 12) and state[0].shape == (2, 2, 8) and again.image is None
+    code, _ = network.encode(None, vector, network.initial_state(2), fresh)
+    assert torch.equal(network.act(vector, code), action)
+    for wrong in ({"vision": "eye"}, {"hidden": "wide"}, {"hidden": 0}):
+        with pytest.raises(InputError):
+            build_network({"class": "DepthActor", **wrong})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
@@ -16,6 +17,9 @@ from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE
 
 NETWORKS: dict[str, type[PolicyNetwork]] = {}
 """Class name to class: what a policy card may name."""
+
+ELSEWHERE = {"DepthActor": "vinl.policies.depth_actor", "NavActor": "vinl.policies.nav_actor"}
+"""Networks that register when their module is imported, and the module."""
 
 
 class PolicyNetwork(nn.Module):
@@ -116,10 +120,15 @@ def build_network(description: dict[str, Any], source: str = "policy card") -> P
     """
     arguments = dict(description)
     name = arguments.pop("class", None)
+    if name in ELSEWHERE:
+        importlib.import_module(ELSEWHERE[name])
     if name not in NETWORKS:
-        known = ", ".join(sorted(NETWORKS))
-        raise InputError(f"{source}: unknown network class {name!r}{closest(str(name), NETWORKS)}; known: {known}")
+        known = sorted({*NETWORKS, *ELSEWHERE})
+        near = closest(str(name), known)
+        raise InputError(f"{source}: unknown network class {name!r}{near}; known: {', '.join(known)}")
     for key, value in arguments.items():
+        if isinstance(value, str | bool):  # names and switches: the class knows which there are
+            continue
         for size in value if isinstance(value, list) else [value]:
             if isinstance(size, bool) or not isinstance(size, int) or size < 1:
                 raise InputError(f"{source}: network size {key} must be a positive whole number, got {size!r}")

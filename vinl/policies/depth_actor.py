@@ -1,0 +1,101 @@
+"""The locomotor that sees: depth and proprioception become the code that the teacher's actor is fed with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor, nn
+
+from vinl.policies.depth_memory import DepthMemory, State
+from vinl.policies.networks import PolicyNetwork, mlp
+from vinl.robot.observation import PROPRIOCEPTION_SIZE
+
+
+class DepthActor(PolicyNetwork):
+    """CNN and memory in place of the teacher's height scan [paper III-C]; deterministic.
+
+    Parameters are named ``memory.*`` (image and past), ``head.*`` (linear to the code) and ``actor.*`` (the teacher's).
+
+    Attributes:
+        image: height and width that it takes [pixels]; None: it is blind.
+        code: size of the code.
+    """
+
+    def __init__(
+        self,
+        vision: str = "cnn",
+        height: int = 36,
+        width: int = 64,
+        visual: int = 32,
+        hidden: int = 64,
+        layers: int = 2,
+        memory: str = "lstm",
+        planes: int = 32,
+        proprioception: int = PROPRIOCEPTION_SIZE,
+        code: int = 32,
+        actor: Sequence[int] = (512, 256, 128),
+        actions: int = 12,
+    ) -> None:
+        """Sizes as in ``DepthMemory``; ``actor`` are the widths of the actor's hidden layers, the teacher's."""
+        super().__init__()
+        self.arguments = {
+            "vision": vision,
+            "height": height,
+            "width": width,
+            "visual": visual,
+            "hidden": hidden,
+            "layers": layers,
+            "memory": memory,
+            "planes": planes,
+            "proprioception": proprioception,
+            "code": code,
+            "actor": list(actor),
+            "actions": actions,
+        }
+        self.observation_size, self.action_size, self.code = proprioception, actions, code
+        self.memory = DepthMemory(vision, height, width, proprioception, visual, hidden, layers, memory, planes)
+        self.image = self.memory.image
+        self.head = nn.Linear(hidden, code)
+        self.actor = mlp([proprioception + code, *actor, actions], nn.ELU)
+
+    def initial_state(self, n: int, device: torch.device | str | None = None) -> State:
+        """The state of n robots that remember nothing."""
+        return self.memory.initial_state(n, device)
+
+    def encode(
+        self,
+        depth: Float[Tensor, "t n height width"] | None,
+        vector: Float[Tensor, "t n k"],
+        state: State,
+        fresh: Bool[Tensor, "t n"],
+    ) -> tuple[Float[Tensor, "t n code"], State]:
+        """The code alone, and the state after the last step; arguments as in ``forward``."""
+        features, state = self.memory(depth, vector, state, fresh)
+        return self.head(features), state
+
+    def act(self, vector: Float[Tensor, "*n k"], code: Float[Tensor, "*n code"]) -> Float[Tensor, "*n actions"]:
+        """Actions of a code, the student's or the teacher's."""
+        return self.actor(torch.cat([vector, code], -1))
+
+    def forward(
+        self,
+        depth: Float[Tensor, "t n height width"] | None,
+        vector: Float[Tensor, "t n k"],
+        state: State,
+        fresh: Bool[Tensor, "t n"],
+    ) -> tuple[Float[Tensor, "t n actions"], State]:
+        """Actions of t steps in a row.
+
+        Args:
+            depth: (t, n, H, W) in [0, 1]: normalised by the camera record of the card.
+            vector: (t, n, 48) scaled proprioception, the observation table without the height scan.
+            state: before the first step.
+            fresh: (t, n) an episode begins with this step.
+
+        Returns:
+            (t, n, 12) actions, and the state after the last step.
+        """
+        code, state = self.encode(depth, vector, state, fresh)
+        return self.act(vector, code), state
