@@ -25,7 +25,7 @@ class Options:
     loco: str = "rough"
     """Locomotor: a shipped policy's name, or a policy folder."""
     nav: str = "oracle"
-    """Navigator: oracle."""
+    """Navigator: oracle (follows the shortest way), a shipped navigation policy's name, or a policy folder."""
     episodes: int = 10
     """Start/goal pairs in each plan; the same for all seeds."""
     seeds: int = 5
@@ -60,6 +60,7 @@ def main(argv: list[str]) -> int:
     from vinl.config.loader import load_config
     from vinl.evaluation.config import EvaluationConfig
     from vinl.evaluation.evaluate import Films, check_numbers, evaluate
+    from vinl.evaluation.navigator import load_navigator
     from vinl.evaluation.progress import Progress
     from vinl.evaluation.report import write_report
     from vinl.evaluation.results_file import check_out, results_as_dict, strip_command, write_json
@@ -73,6 +74,7 @@ def main(argv: list[str]) -> int:
     check_numbers(options.episodes, options.seeds, options.first_seed, options.obstacles, workers)
     config = load_config(EvaluationConfig, options.config, options.set)
     policy = load_policy(options.loco, options.device)
+    navigator = load_navigator(options.nav, config, options.device)
     plans = load_floorplans(options.floorplans, options.resolution, options.min_speck)
     if not plans:
         raise InputError("no floor plan is shipped with this version; give files: --floorplans FILE")
@@ -81,7 +83,7 @@ def main(argv: list[str]) -> int:
         results = evaluate(
             plans,
             policy,
-            options.nav,
+            navigator,
             options.episodes,
             options.seeds,
             options.first_seed,

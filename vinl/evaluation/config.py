@@ -50,6 +50,7 @@ class EvaluationConfig:
         max_tilt: a trunk tilted farther than this has fallen [rad].
         stuck_window: a time-out counts as ``stuck`` if over so many last seconds [s] ...
         stuck_distance: ... the robot ended nearer than this to where it was [m].
+        ceiling: height of a ceiling that the cameras see [m]; none by default.
         min_metres: episodes shorter than this do not count in the rates per metre [m] [paper: 1 m].
         oracle: how the shortest-path follower walks.
     """
@@ -63,6 +64,7 @@ class EvaluationConfig:
     max_tilt: float = math.radians(72)
     stuck_window: float = 20.0
     stuck_distance: float = 0.5
+    ceiling: float | None = None
     min_metres: float = 1.0
     oracle: OracleConfig = field(default_factory=OracleConfig)
 
@@ -73,6 +75,8 @@ class EvaluationConfig:
             raise InputError(f"navigation_period must be at least 1 control step, got {self.navigation_period}")
         if not 0 < self.max_tilt <= math.pi:
             raise InputError(f"max_tilt must lie in (0, pi] rad, got {self.max_tilt}")
+        if self.ceiling is not None and not 1 <= self.ceiling <= 100:
+            raise InputError(f"ceiling must lie between 1 and 100 m, got {self.ceiling}; null for none")
         for name in ("success_radius", "stuck_window", "min_metres"):
             if not getattr(self, name) > 0:
                 raise InputError(f"{name} must be positive, got {getattr(self, name)}")

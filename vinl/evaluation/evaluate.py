@@ -16,10 +16,13 @@ from vinl.config.loader import dump_config
 from vinl.evaluation.config import EvaluationConfig
 from vinl.evaluation.crew import Context, Crew
 from vinl.evaluation.episodes import draw_routes, draw_setups
+from vinl.evaluation.learned_navigator import LearnedNavigator
 from vinl.evaluation.metrics import aggregate_episodes
-from vinl.evaluation.navigator import load_navigator
+from vinl.evaluation.navigator import ORACLE, Navigator, load_navigator
+from vinl.evaluation.oracle import OracleNavigator
 from vinl.evaluation.records import Episode, Results
 from vinl.evaluation.rollout import run_episodes
+from vinl.evaluation.senses import check_senses as check_senses
 from vinl.evaluation.video import FilmJob, film
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
@@ -46,7 +49,7 @@ class Shared:
     """What all units have in common."""
 
     locomotor: Policy
-    navigator: str
+    navigator: Navigator
     clutter: ClutterPreset
     config: EvaluationConfig
 
@@ -54,7 +57,7 @@ class Shared:
 def evaluate(
     floorplans: Sequence[FloorPlan],
     locomotor: str | Path | Policy = "rough",
-    navigator: str = "oracle",
+    navigator: str | Path | Navigator = ORACLE,
     episodes: int = 10,
     seeds: int = 5,
     first_seed: int = 0,
@@ -73,7 +76,8 @@ def evaluate(
     Args:
         floorplans: see ``vinl.world.readers``.
         locomotor: name or folder of a policy, or a loaded one.
-        navigator: name of a navigator.
+        navigator: ``"oracle"``, name or folder of a navigation policy, or a navigator of one's own; with more than one
+            worker it is pickled.
         episodes: start/goal pairs a plan; the same for all seeds.
         seeds: repetitions; a seed changes clutter, heading and joint angles at the start.
         first_seed: the first of them.
@@ -95,7 +99,7 @@ def evaluate(
     if films != "none" and out is None:
         raise InputError("films need a folder to be written to; give out")
     check_numbers(episodes, seeds, first_seed, obstacles, workers)
-    load_navigator(navigator, config)
+    guide = load_navigator(navigator, config) if isinstance(navigator, (str, Path)) else navigator
     policy = load_policy(locomotor) if isinstance(locomotor, (str, Path)) else locomotor
     check_senses(policy)
     began = time.perf_counter()
@@ -107,7 +111,7 @@ def evaluate(
         for seed in range(first_seed, first_seed + seeds):
             rows = {"none": 0, "first": 1, "all": episodes}[films] if seed == first_seed else 0
             jobs.append(Job(plan, routes, seed, tuple(range(rows))))
-    shared, videos = Shared(policy, navigator, CLUTTER[obstacles], config), []
+    shared, videos = Shared(policy, guide, CLUTTER[obstacles], config), []
     with Crew(min(workers, len(jobs)), shared) as crew:
         units = crew.run(run_job, jobs, _counter(on_progress, "walk", len(jobs) * episodes))
         if films != "none":
@@ -125,7 +129,7 @@ def evaluate(
         "episodes_per_plan": episodes,
         "seeds": list(range(first_seed, first_seed + seeds)),
     }
-    policies = {"locomotion": describe_policy(policy), "navigation": {"name": navigator}}
+    policies = {"locomotion": describe_policy(policy), "navigation": describe_navigator(guide)}
     return Results(done, aggregate, plans, policies, settings, wall, videos)
 
 
@@ -133,12 +137,11 @@ def run_job(context: Context, job: Job) -> list[Episode]:
     """One unit of work, in whatever process."""
     shared: Shared = context.shared
     setups = draw_setups(job.plan, job.routes, job.seed, shared.clutter, shared.config)
-    navigator = load_navigator(shared.navigator, shared.config)
     return run_episodes(
         job.plan,
         setups,
         shared.locomotor,
-        navigator,
+        shared.navigator,
         shared.config,
         job.filmed,
         lambda _: context.tell(),
@@ -158,6 +161,13 @@ def describe_policy(policy: Policy) -> dict[str, Any]:
     card = policy.card
     digest = hashlib.sha256(json.dumps(asdict(card), sort_keys=True).encode()).hexdigest()
     return {"name": card.name, "kind": card.kind, "card_sha256": digest, "samples": card.samples, "commit": card.commit}
+
+
+def describe_navigator(navigator: Navigator) -> dict[str, Any]:
+    """Which navigator it was: the policy, or the name alone."""
+    if isinstance(navigator, LearnedNavigator):
+        return describe_policy(navigator.policy)
+    return {"name": ORACLE if isinstance(navigator, OracleNavigator) else type(navigator).__name__}
 
 
 def _counter(on_progress: Callable[[str, int, int], None], what: str, total: int) -> Callable[[], None]:
@@ -181,16 +191,6 @@ def _name_apart(plans: Sequence[FloorPlan]) -> list[FloorPlan]:
         k = taken[plan.name]
         apart.append(plan if k == 1 else replace(plan, name=f"{plan.name}-{k}"))
     return apart
-
-
-def check_senses(policy: Policy) -> None:
-    """Refuse a policy that observes what the roll-out does not provide.
-
-    Raises:
-        InputError: it sees through a camera.
-    """
-    if policy.card.camera is not None:
-        raise InputError(f"policy {policy.card.name} sees through a camera; the evaluation only has the height scan")
 
 
 def check_numbers(episodes: int, seeds: int, first_seed: int, obstacles: str, workers: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -12,6 +13,8 @@ from jaxtyping import Float
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.evaluation.config import EvaluationConfig
+from vinl.policies.card import read_card
+from vinl.policies.io import find_policy, list_policies, load_policy
 from vinl.robot.cameras import Camera
 from vinl.world.free_space import FreeSpace
 from vinl.world.start_goal import StartGoal
@@ -45,25 +48,53 @@ class Navigator(Protocol):
         Args:
             observation: ``goal`` (n, 3): straight distance [m], cosine and sine of the bearing in the robot's heading
                 frame, left positive; ``previous_action`` (n, 2): what this returned last, zero at first; ``pose``
-                (n, 3): x, y [m] and yaw [rad], privileged, for oracles; ``depth`` (n, height, width) [m] if the
-                navigator has a camera. Rows of episodes that are over stay, with their last values.
+                (n, 3): x, y [m] and yaw [rad], privileged, for oracles; ``depth`` (n, height, width) [m], if the
+                navigator has a camera: a torch tensor that the next step overwrites. Rows of episodes that are over
+                stay, with their last values.
         """
         ...
 
 
-NAVIGATORS = ("oracle",)
-"""Navigators by name."""
+ORACLE = "oracle"
+"""The name of the shortest-path follower."""
 
 
-def load_navigator(name: str, config: EvaluationConfig) -> Navigator:
-    """A navigator by name.
+def load_navigator(name: str | Path, config: EvaluationConfig, device: str = "cpu") -> Navigator:
+    """The oracle, or a trained navigator.
+
+    Args:
+        name: ``"oracle"``, a shipped navigation policy's name, a policy folder or the folder of a training run.
+        config: how the oracle walks.
+        device: of a trained navigator.
 
     Raises:
-        InputError: there is none of that name.
+        InputError: there is none of that name, or it is a policy of another kind.
     """
-    if name == "oracle":
+    if name == ORACLE:
         from vinl.evaluation.oracle import OracleNavigator
 
         return OracleNavigator(config.oracle)
-    known = ", ".join(NAVIGATORS)
-    raise InputError(f"unknown navigator {name!r}{closest(name, NAVIGATORS)}; known: {known}")
+    from vinl.evaluation.learned_navigator import LearnedNavigator
+
+    bare, shipped = str(name).removeprefix("vinl/"), list_policies()
+    if bare not in shipped and not Path(name).exists():
+        known = [ORACLE, *[policy for policy in shipped if read_card(find_policy(policy)).kind == "navigation"]]
+        raise InputError(
+            f"unknown navigator {str(name)!r}{closest(bare, known)}; known: {', '.join(known)}; or give a policy folder"
+        )
+    return LearnedNavigator(load_policy(name, device))
+
+
+def check_choice(choice: Any, n: int, navigator: Navigator) -> Float[np.ndarray, "n 2"]:
+    """What a navigator answered, if it makes sense.
+
+    Raises:
+        InputError: another shape than (n, 2), or numbers that are not finite.
+    """
+    found = np.asarray(choice, dtype=np.float64)
+    name = type(navigator).__name__
+    if found.shape != (n, 2):
+        raise InputError(f"navigator {name} must return speeds and yaw rates of shape ({n}, 2), got {found.shape}")
+    if not np.isfinite(found).all():
+        raise InputError(f"navigator {name} returned numbers that are not finite (NaN or infinite)")
+    return found

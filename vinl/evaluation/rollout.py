@@ -9,15 +9,15 @@ from jaxtyping import Float
 
 from vinl.evaluation.config import EvaluationConfig
 from vinl.evaluation.episodes import EpisodeSetup
-from vinl.evaluation.ground_scan import GroundScan
-from vinl.evaluation.navigator import Navigator, Task
+from vinl.evaluation.eyes import open_eyes
+from vinl.evaluation.navigator import Navigator, Task, check_choice
 from vinl.evaluation.records import Episode
 from vinl.evaluation.scene import build_scene
+from vinl.evaluation.senses import give_senses
 from vinl.evaluation.tally import Tally
 from vinl.evaluation.walker import Walker, joint_targets
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT
-from vinl.robot.observation import observe
 from vinl.robot.rotation import yaw_of
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
@@ -48,12 +48,13 @@ def run_episodes(
     """Run episodes of one plan in lockstep.
 
     Both policies are always asked for all rows, those of finished episodes too, so that the answer to one row never
-    depends on which others are still under way: the result of a unit is the same in any process.
+    depends on which others are still under way: the result of a unit is the same in any process. Only images are
+    rendered for the living alone; the others keep their last one.
 
     Args:
         plan: the floor plan.
         setups: the episodes.
-        locomotor: observations (n, 235) to actions (n, 12).
+        locomotor: see ``Senses``.
         navigator: see ``Navigator``.
         config: limits of an episode.
         filmed: rows whose poses are kept.
@@ -62,12 +63,15 @@ def run_episodes(
 
     Raises:
         InterruptedRunError: ``is_stopped`` said so.
+        InputError: a policy answered what is no answer.
     """
     n, space = len(setups), FreeSpace(plan)
     locomotor.reset(n)
     navigator.reset([Task(space, setup.route) for setup in setups])
     walkers = _spawn_walkers(plan, setups, locomotor)
-    scan = GroundScan(plan, [setup.blocks for setup in setups])
+    blocks = [setup.blocks for setup in setups]
+    senses = give_senses(locomotor, plan, blocks, config.ceiling)
+    eyes = None if navigator.camera is None else open_eyes(plan, blocks, navigator.camera, config.ceiling)
     goals = np.stack([setup.route.goal for setup in setups])
     tallies = [Tally(setup, space, config, film=k in filmed) for k, setup in enumerate(setups)]
     command, choice, actions = np.zeros((n, 3)), np.zeros((n, 2)), np.zeros((n, 12), np.float32)
@@ -79,13 +83,14 @@ def run_episodes(
             if is_stopped():
                 raise InterruptedRunError
             pose = np.column_stack([qpos[:, :2], yaw_of(np, qpos[:, 3:7])])
-            choice = navigator.act(
-                {"goal": goal_in_heading_frame(pose, goals), "previous_action": choice, "pose": pose}
-            )
+            seen = {"goal": goal_in_heading_frame(pose, goals), "previous_action": choice, "pose": pose}
+            if eyes is not None:
+                seen["depth"] = eyes.look(qpos, alive)
+            choice = check_choice(navigator.act(seen), n, navigator)
             command[:, 0], command[:, 2] = choice[:, 0], choice[:, 1]
         for k in alive:
             tallies[k].note_pose(step, qpos[k], command[k])
-        actions = locomotor.act(observe(np, qpos, qvel, command, actions, scan.read(qpos)))
+        actions = senses.act(qpos, qvel, command, actions, alive)
         targets = joint_targets(actions, locomotor.card)
         for k in alive:
             walkers[k].step(targets[k])

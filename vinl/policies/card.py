@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -27,7 +28,8 @@ class PolicyCard:
         name: short name.
         network: class name and sizes, as ``PolicyNetwork.describe`` gives them.
         observation: rows of the observation table, as ``robot.observation.describe`` gives them.
-        action: ``scale`` [rad], ``default_pose`` [rad], ``kp`` [N m/rad], ``kd`` [N m s/rad] that it was trained with.
+        action: ``scale`` [rad], ``default_pose`` [rad], ``kp`` [N m/rad], ``kd`` [N m s/rad] that it was trained with;
+            of a navigator ``forward_speed`` [m/s] and ``yaw_rate`` [rad/s] at the actions -1 and 1.
         camera: the depth camera that it sees through, or None.
         training: the resolved training configuration.
         seed: of the training run.
@@ -62,16 +64,45 @@ class PolicyCard:
         return sum(int(row["size"]) for row in self.observation)
 
 
+NAVIGATION_TABLE: tuple[dict[str, Any], ...] = (
+    {"name": "goal_distance", "size": 1, "scale": [0.2], "unit": "m"},
+    {"name": "goal_direction", "size": 2, "scale": [1.0], "unit": "cosine, sine"},
+    {"name": "previous_action", "size": 2, "scale": [1.0], "unit": "1"},
+)
+"""What a navigator observes beside depth: straight distance to the goal, its bearing in the heading frame (left is
+positive), and its last action, held to [-1, 1], zero when an episode begins."""
+
+FORWARD_SPEED = (0.0, 1.0)
+"""Forward speed at the actions -1 and 1 [m/s] [paper]."""
+
+YAW_RATE = (-math.pi / 3, math.pi / 3)
+"""Yaw rate at the actions -1 and 1 [rad/s] [paper: 60 deg/s]."""
+
+
 def describe_action() -> dict[str, Any]:
     """How actions become joint targets on this robot, as plain data for a card."""
     return {"scale": ACTION_SCALE, "default_pose": DEFAULT_POSE.tolist(), "kp": KP, "kd": KD}
 
 
 def locomotion_card(
-    name: str, network: dict[str, Any], action: dict[str, Any] | None = None, **rest: Any
+    name: str, network: dict[str, Any], action: dict[str, Any] | None = None, scan: bool = True, **rest: Any
 ) -> PolicyCard:
-    """A locomotion card with this robot's observation table and, unless given, action; ``rest`` are further fields."""
-    return PolicyCard("locomotion", name, network, describe(), action or describe_action(), **rest)
+    """A locomotion card with this robot's observation table and, unless given, action; ``rest`` are further fields.
+
+    Args:
+        name: short name.
+        network: as ``PolicyNetwork.describe`` gives it.
+        action: scale, default pose and gains.
+        scan: whether it observes the height scan; a policy that sees through a camera does not.
+    """
+    table = describe() if scan else describe()[:-1]
+    return PolicyCard("locomotion", name, network, table, action or describe_action(), **rest)
+
+
+def navigation_card(name: str, network: dict[str, Any], camera: dict[str, Any] | None, **rest: Any) -> PolicyCard:
+    """A navigation card with the table and the action scaling that ``NavActor`` has; ``rest`` are further fields."""
+    action = {"forward_speed": list(FORWARD_SPEED), "yaw_rate": list(YAW_RATE)}
+    return PolicyCard("navigation", name, network, [dict(row) for row in NAVIGATION_TABLE], action, camera, **rest)
 
 
 def write_card(folder: Path, card: PolicyCard) -> None:

@@ -14,11 +14,12 @@ from torch import Tensor
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.config.paths import assets_dir
-from vinl.policies.card import CARD_FILE, PolicyCard, read_card, write_card
+from vinl.policies.card import CARD_FILE, NAVIGATION_TABLE, PolicyCard, read_card, write_card
+from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.device import choose_device
 from vinl.policies.networks import PolicyNetwork, build_network
 from vinl.policies.policy import LocomotionPolicy
-from vinl.robot.observation import describe
+from vinl.robot.observation import PROPRIOCEPTION_SIZE, describe
 
 WEIGHTS_FILE = "policy.safetensors"
 
@@ -49,8 +50,9 @@ def find_policy(name_or_path: str | Path) -> Path:
     raise InputError(f"unknown policy {text!r}{closest(bare, names)}; {known}; or give a policy folder")
 
 
-def load_policy(name_or_path: str | Path, device: str = "cpu") -> LocomotionPolicy:
-    """A trained policy, ready to act.
+def load_policy(name_or_path: str | Path, device: str = "cpu") -> LocomotionPolicy | DepthPolicy:
+    """A trained policy, ready to act: one that sees or remembers as a ``DepthPolicy``, any other as a
+    ``LocomotionPolicy``.
 
     Args:
         name_or_path: ``"rough"``, ``"vinl/rough"``, a policy folder or the folder of a training run.
@@ -62,7 +64,6 @@ def load_policy(name_or_path: str | Path, device: str = "cpu") -> LocomotionPoli
     target = choose_device(device)
     folder = find_policy(name_or_path)
     card = read_card(folder)
-    _check_against_robot(card, folder)
     source = str(folder / CARD_FILE)
     with torch.device("meta"):  # allocates nothing before the shapes are known to fit, and draws no random number
         network = build_network(card.network, source)
@@ -71,10 +72,12 @@ def load_policy(name_or_path: str | Path, device: str = "cpu") -> LocomotionPoli
             f"{source}: the network takes {network.observation_size} numbers, "
             f"the observation table has {card.observation_size}"
         )
+    sees = hasattr(network, "image")
+    _check_against_robot(card, folder, network, sees)
     weights = _read_weights(folder / WEIGHTS_FILE)
     _check_weights(network, weights, folder)
     network.load_state_dict({key: w.to(target, torch.float32) for key, w in weights.items()}, assign=True)
-    return LocomotionPolicy(network, card)
+    return DepthPolicy(network, card) if sees else LocomotionPolicy(network, card)
 
 
 def save_policy(folder: str | Path, network: PolicyNetwork, card: PolicyCard, half: bool = False) -> Path:
@@ -124,20 +127,29 @@ def _refuse_foreign_folder(folder: Path) -> None:
         raise InputError(f"{folder} holds {foreign[0]} and is no policy folder; choose another folder")
 
 
-def _check_against_robot(card: PolicyCard, folder: Path) -> None:
-    """A locomotor must have been trained on the observation table that this version fills."""
-    if card.kind != "locomotion":
-        raise InputError(f"{folder} is a {card.kind} policy, which this version cannot run; give a locomotion policy")
-    known = {row["name"]: row for row in describe()}
-    for row, expected in zip(card.observation, describe(), strict=False):
+def _check_against_robot(card: PolicyCard, folder: Path, network: PolicyNetwork, sees: bool) -> None:
+    """A policy must have been trained on what this version lets it observe, and move what this robot moves."""
+    if card.kind == "navigation":
+        wanted, actions = [dict(row) for row in NAVIGATION_TABLE], 2
+    else:
+        wanted, actions = describe(), 12
+        if network.observation_size == PROPRIOCEPTION_SIZE:  # what sees needs no height scan
+            wanted = wanted[:-1]
+    if network.action_size != actions or (card.kind == "navigation" and not sees):
+        name, given = card.network["class"], network.action_size
+        raise InputError(
+            f"{folder} is a {card.kind} policy, but its network {name} ({given} actions) is not one of a {card.kind} "
+            f"policy ({actions} actions)"
+        )
+    for row, expected in zip(card.observation, wanted, strict=False):
         if any(row.get(key) != expected[key] for key in ("name", "size", "scale")):
-            near = closest(row["name"], known)
+            near = closest(row["name"], [known["name"] for known in wanted])
             raise InputError(
                 f"{folder / CARD_FILE}: observation {row['name']!r} (size {row['size']}) is not what this version "
                 f"fills there: {expected['name']!r} (size {expected['size']}, scale {expected['scale']}){near}"
             )
-    if len(card.observation) != len(known):
-        raise InputError(f"{folder / CARD_FILE}: observation has {len(card.observation)} rows, expected {len(known)}")
+    if len(card.observation) != len(wanted):
+        raise InputError(f"{folder / CARD_FILE}: observation has {len(card.observation)} rows, expected {len(wanted)}")
 
 
 def _read_weights(path: Path) -> dict[str, Tensor]:

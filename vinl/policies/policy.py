@@ -11,27 +11,38 @@ from torch import Tensor
 
 from vinl.policies.card import PolicyCard
 from vinl.policies.networks import PolicyNetwork
+from vinl.robot.cameras import Camera
 
 A = TypeVar("A", np.ndarray, Tensor)
 
 
 @runtime_checkable
 class Policy(Protocol):
-    """Batched: one call acts for all robots. Recurrent state, if any, lives inside."""
+    """Batched: one call acts for all robots. Recurrent state, if any, lives inside.
+
+    Attributes:
+        card: what the policy needs to be used; ``card.observation_size`` numbers are observed.
+        camera: the depth camera that it sees through; ``act`` then takes depth (n, height, width) [m] as its second
+            argument. None: it takes numbers alone.
+    """
 
     card: PolicyCard
+    camera: Camera | None
 
     def reset(self, which: int | Bool[np.ndarray, " n"] | Bool[Tensor, " n"]) -> None:
         """Forget the past of all of n robots, or of those that a mask marks."""
         ...
 
-    def act(self, observation: Any) -> Any:
+    def act(self, observation: Any, depth: Any = None) -> Any:
         """Actions for the observations of all robots; numpy in, numpy out; torch in, torch out."""
         ...
 
 
 class LocomotionPolicy:
     """Observations (n, 235) to actions (n, 12) at 50 Hz, without noise, on the device of its network."""
+
+    camera: Camera | None = None
+    """It needs no camera."""
 
     def __init__(self, network: PolicyNetwork, card: PolicyCard) -> None:
         """Takes the network over: it is put into evaluation mode and its gradients are switched off."""
@@ -42,11 +53,12 @@ class LocomotionPolicy:
     def reset(self, which: int | Bool[np.ndarray, " n"] | Bool[Tensor, " n"]) -> None:
         """This policy has no memory: nothing to forget."""
 
-    def act(self, observation: Float[A, "n observation"]) -> Float[A, "n actions"]:
+    def act(self, observation: Float[A, "n observation"], depth: None = None) -> Float[A, "n actions"]:
         """Actions for scaled observations.
 
         Args:
             observation: (n, 235) in the order of the card's observation table, numpy or torch, any float type.
+            depth: this policy has no camera.
 
         Returns:
             (n, 12) of the same kind and on the same device; numpy as float32.

@@ -1,0 +1,76 @@
+"""What the robots of a unit see: one launch of the depth camera for all that live."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from vinl.robot.cameras import Camera
+from vinl.robot.rotation import matrix_of
+from vinl.sensing.depth import DepthCamera, Mesh
+from vinl.world.blocks import Blocks
+from vinl.world.floorplan import FloorPlan
+from vinl.world.mesh import floorplan_mesh
+
+
+class Eyes:
+    """A depth camera on each of n robots, on the CPU. The robots do not see each other, nor themselves.
+
+    Args:
+        meshes: the worlds, vertices (v, 3) [m] and faces (f, 3).
+        worlds: (n,) the world that each robot is in.
+        camera: what each of them carries.
+    """
+
+    def __init__(self, meshes: Sequence[Mesh], worlds: Sequence[int], camera: Camera) -> None:
+        self.camera = camera
+        self._depth = DepthCamera(meshes, camera)
+        self._worlds = np.asarray(worlds, dtype=np.int32)
+        self._images = torch.full((len(worlds), camera.height, camera.width), camera.far)
+
+    def look(
+        self, qpos: Float[np.ndarray, "n 19"], rows: Sequence[int] | None = None
+    ) -> Float[torch.Tensor, "n height width"]:
+        """Depth [m] along the optical axis, the far limit where nothing is hit.
+
+        Args:
+            qpos: (n, 19) generalised position of every robot; only the trunk's pose is read.
+            rows: the robots that look; the others keep their last image. All of them by default.
+
+        Returns:
+            (n, height, width), overwritten by the next call.
+        """
+        if rows is None or len(rows) == len(self._worlds):
+            trunk = matrix_of(np, qpos[:, 3:7])
+            return self._depth.render(self._worlds, qpos[:, :3], trunk, out=self._images)
+        if len(rows):
+            at = qpos[list(rows), :7]
+            seen = self._depth.render(self._worlds[list(rows)], at[:, :3], matrix_of(np, at[:, 3:7]))
+            self._images[torch.as_tensor(rows)] = seen
+        return self._images
+
+
+def open_eyes(plan: FloorPlan, blocks: Sequence[Blocks], camera: Camera, ceiling: float | None = None) -> Eyes:
+    """Eyes of the robots of a unit in their homes: walls, furniture, floor and the clutter of each episode.
+
+    Args:
+        plan: the floor plan.
+        blocks: the clutter, one for each robot. Robots without any share one mesh.
+        camera: what each robot carries.
+        ceiling: height of a ceiling [m]; none by default.
+    """
+    meshes: list[Mesh] = []
+    worlds: list[int] = []
+    bare = -1
+    for some in blocks:
+        if not len(some) and bare >= 0:
+            worlds.append(bare)
+            continue
+        if not len(some):
+            bare = len(meshes)
+        worlds.append(len(meshes))
+        meshes.append(floorplan_mesh(plan, some, ceiling))
+    return Eyes(meshes, worlds, camera)
