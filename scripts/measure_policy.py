@@ -20,9 +20,9 @@ from vinl.policies.card import read_card, write_card
 
 LOCO = {
     "flat": "eval-loco --terrain flat --robots 64 --seconds 20 --seed 0",
-    "flat_forward_only": "eval-loco --terrain flat --robots 64 --seconds 20 --seed 0 --forward-only",
+    "flat_forward_only": "eval-loco --terrain flat --robots 64 --seconds 20 --seed 0 --commands forward",
     "rough": "eval-loco --terrain rough --robots 192 --seconds 20 --seed 0",
-    "rough_forward_only": "eval-loco --terrain rough --robots 192 --seconds 20 --seed 0 --forward-only",
+    "rough_forward_only": "eval-loco --terrain rough --robots 192 --seconds 20 --seed 0 --commands forward",
     "blocks": "eval-loco --terrain blocks --density 1.0 --robots 64 --seconds 20 --seed 0",
 }
 CHAIN = {

@@ -1,10 +1,19 @@
 """The locomotor alone."""
 
+import numpy as np
 import pytest
 
+from vinl.evaluation.courses import COMMANDS, FIXED, Course, Start, choose_commands, command_ranges, draw_commands
 from vinl.evaluation.grounds import GroundConfig, build_ground
-from vinl.evaluation.locomotor import command_ranges, evaluate_locomotor
+from vinl.evaluation.herd import BoxHerd
+from vinl.evaluation.locomotor import compare_locomotors, evaluate_locomotor
+from vinl.evaluation.robot_records import RobotRecord, aggregate_robots
+from vinl.evaluation.scene import build_scene
+from vinl.evaluation.touches import BINS
 from vinl.policies.policy import LocomotionPolicy
+from vinl.robot.aliengo import DEFAULT_POSE
+from vinl.world.blocks import Blocks
+from vinl.world.boxes import Boxes
 
 
 def test_same_numbers_from_two_processes(trotting: LocomotionPolicy) -> None:
@@ -28,13 +37,72 @@ def test_rough_ground_has_levels() -> None:
 
 
 def test_commands_are_those_of_the_training_but_not_faster(standing: LocomotionPolicy) -> None:
-    assert command_ranges(standing).forward == (-1.0, 1.0)
+    assert command_ranges("trained", [standing]).forward == (-1.0, 1.0)
     standing.card.training["commands"] = {"forward": [0.0, 1.0], "left": [0.0, 0.0], "yaw_rate": [-1.05, 1.05]}
     try:
-        ranges = command_ranges(standing)
+        ranges = command_ranges("trained", [standing])
     finally:
         del standing.card.training["commands"]
     assert (ranges.forward, ranges.left, ranges.yaw_rate) == ((0.0, 1.0), (0.0, 0.0), (-1.0, 1.0))
+    assert command_ranges("forward", [standing]).left == (0.0, 0.0)
+
+
+def test_commands_of_every_name_stay_in_their_ranges(standing: LocomotionPolicy) -> None:
+    assert choose_commands(None, "blocks") == "turns" and choose_commands(None, "flat") == "trained"
+    for name in COMMANDS:
+        ranges = command_ranges(name, [standing])
+        commands, fresh = draw_commands(ranges, np.random.default_rng(0), 20_000)
+        assert fresh[0] and fresh.sum() > 20
+        assert (commands[1:] == commands[:-1]).all(1)[~fresh[1:]].all()
+        for k, bounds in enumerate((ranges.forward, ranges.left, ranges.yaw_rate)):
+            assert commands[:, k].min() >= min(bounds[0], 0) and commands[:, k].max() <= max(bounds[1], 0)
+    asked, fresh = draw_commands(FIXED["navigator"], np.random.default_rng(0), 20_000)
+    assert (np.diff(np.flatnonzero(fresh)) % 25 == 0).all()
+    assert (asked == 0).all(1).any() and ((asked[:, 0] == 0) & (asked[:, 2] != 0)).any()
+    assert draw_commands(FIXED["turns"], np.random.default_rng(0), 20_000)[0][:, 0].min() >= 0.3
+
+
+def test_all_policies_meet_the_same_courses(standing: LocomotionPolicy, trotting: LocomotionPolicy) -> None:
+    alone = evaluate_locomotor(trotting, "blocks", 3, 0.5)
+    together = compare_locomotors([standing, trotting], "blocks", 3, 0.5)
+    assert together[1].robots == alone.robots
+    assert together[0].config == together[1].config
+    ground = build_ground(GroundConfig("blocks", 1.0, None, 0, 40.0, 2.0))
+    bare = build_ground(GroundConfig("blocks", 0.0, None, 0, 40.0, 2.0))
+    course, other = (Course(g, FIXED["turns"], 0, 5, 100) for g in (ground, bare))
+    np.testing.assert_array_equal(course.commands, other.commands)
+    assert ground.reach == bare.reach < np.inf
+    start = course.draw_start()
+    gap = np.linalg.norm(ground.blocks.rows[:, :2] - [start.x, start.y], axis=1).min()
+    assert gap > 0.65
+
+
+def test_feet_and_legs_are_told_apart(standing: LocomotionPolicy) -> None:
+    block = Blocks(np.array([[0.24, 0.13, 0.0, 0.3, 0.2, 0.13]]))  # under the front left foot
+    herd = BoxHerd(build_scene(Boxes.empty(), block.boxes()), 2)
+    herd.start(0, Start(0.0, 0.0, 0.0, DEFAULT_POSE, 0.1))
+    herd.start(1, Start(5.0, 0.0, 0.0, DEFAULT_POSE, 0.0))
+    feet, bins = np.zeros((2, 4), bool), np.zeros((2, BINS), bool)
+    for _ in range(8):
+        herd.step(np.stack([DEFAULT_POSE] * 2))
+        feet |= herd.touches.feet
+        bins |= herd.touches.foot_bins
+    assert feet[0, 0] and not feet[0, 1:].any() and not feet[1].any()
+    assert bins[0].tolist() == [False, True, False, False, False]
+
+
+def test_figures_of_known_records() -> None:
+    records = [
+        RobotRecord(k, "blocks", None, metres=2.0, steps=10, foot_block_steps=k, foot_pair_steps=[k, 0]) for k in (0, 4)
+    ]
+    records[1].falls, records[1].errors, records[1].foot_height_steps = 1, [0.2, 0.0, 0.0, 0.0], [0, 4, 0, 0, 0]
+    figures = aggregate_robots(records, np.array([0.5, 0.5, 0.0, 0.0, 0.0]))
+    assert figures["foot_block_per_m"] == 1.0 and figures["falls"] == 0.5
+    assert figures["foot_front_block_per_m"] == 1.0 and figures["foot_rear_block_per_m"] == 0.0
+    assert figures["linear_velocity_rmse"] == 0.1
+    assert figures["ci95"]["foot_block_per_m"] == [0.0, 2.0]
+    assert figures["foot_block_per_m_by_height"]["0.12-0.14"] == 2.0
+    assert figures["foot_block_per_m_by_height"]["0.14-0.16"] is None
 
 
 @pytest.mark.parametrize(
@@ -46,6 +114,7 @@ def test_commands_are_those_of_the_training_but_not_faster(standing: LocomotionP
         ({"terrain": "blocks", "density": -1.0}, "--density"),
         ({"terrain": "rough", "level": 10}, "--level"),
         ({"level": 3}, "--level"),
+        ({"commands": "turn"}, "did you mean"),
     ],
 )
 def test_bad_options(standing: LocomotionPolicy, options: dict, message: str) -> None:

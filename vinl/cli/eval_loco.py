@@ -3,33 +3,38 @@
 from __future__ import annotations
 
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from vinl.cli.options import parse_options
+from vinl.config.errors import InputError
 
 
 @dataclass(frozen=True)
 class Options:
-    """Let robots follow random commands, held 5-10 s, and measure tracking, falls and contacts: results.json."""
+    """Let robots follow random commands and measure tracking, falls and contacts: results.json and a picture."""
 
     out: str
-    """Folder for results.json."""
-    policy: str = "rough"
-    """A shipped policy's name, or a policy folder."""
+    """Folder for results.json, contacts.png (on blocks) and what --step draws."""
+    policy: str | None = None
+    """A shipped policy's name, or a policy folder; rough by default."""
+    compare: tuple[str, ...] = ()
+    """Several policies in place of --policy: all on the same courses, one table."""
     terrain: str = "flat"
     """flat, rough (the terrains of stage 1) or blocks."""
+    commands: str | None = None
+    """turns (0.3-1 m/s and up to 1 rad/s; the default on blocks), straight, spin (on the spot), navigator (0-1 m/s and
+    up to 60 deg/s, changed every 0.5-4 s, standing and turning on the spot included), trained (what the policy was
+    trained for; the default elsewhere) or forward (the same without sideways)."""
     robots: int = 64
-    """How many robots."""
+    """How many robots for each policy."""
     seconds: float = 20.0
     """How long [s]."""
     seed: int = 0
     """Of terrain, starts and commands."""
     density: float = 1.0
-    """Blocks per m2, for blocks."""
+    """Blocks per m2, for blocks; 0 is level floor under the same rules."""
     level: int | None = None
     """Level of all robots, 0 to 9, for rough; 1 to 9 by turns if not given."""
-    forward_only: bool = False
-    """No sideways velocities: only forward (or back) and turning, as a navigator commands."""
     workers: int | None = None
     """Processes; the number of cores by default. Results do not depend on it."""
     device: str = "cpu"
@@ -40,49 +45,54 @@ def main(argv: list[str]) -> int:
     """Run the evaluation and print its figures."""
     options = parse_options(Options, argv, "eval-loco")
     from rich.console import Console
-    from rich.table import Table
 
+    from vinl.evaluation.courses import choose_commands
     from vinl.evaluation.grounds import GroundConfig
-    from vinl.evaluation.locomotor import check_locomotor_numbers, evaluate_locomotor
+    from vinl.evaluation.locomotor import check_locomotor_numbers, compare_locomotors
+    from vinl.evaluation.locomotor_report import (
+        draw_contacts,
+        label_policies,
+        print_comparison,
+        print_figures,
+        results_as_dict,
+    )
     from vinl.evaluation.progress import Progress
-    from vinl.evaluation.results_file import SCHEMA, check_out, describe_environment, strip_command, write_json
+    from vinl.evaluation.results_file import check_out, strip_command, write_json
     from vinl.policies.io import load_policy
 
+    if options.policy is not None and options.compare:
+        raise InputError("--policy and --compare exclude each other; name all policies after --compare")
+    names = list(options.compare) or [options.policy or "rough"]
+    if len(set(names)) < len(names):
+        raise InputError(f"--compare names a policy twice: {' '.join(names)}")
     out = check_out(options.out)
     workers = os.cpu_count() or 1 if options.workers is None else options.workers
     check_locomotor_numbers(options.robots, options.seconds, options.seed, workers)
+    choose_commands(options.commands, options.terrain)
     GroundConfig(options.terrain, options.density, options.level, options.seed, 1.0, 1.0)  # refuses what it cannot draw
-    policy = load_policy(options.policy, options.device)
+    policies = [load_policy(name, options.device) for name in names]
     console = Console()
     with Progress(console) as progress:
-        results = evaluate_locomotor(
-            policy,
+        results = compare_locomotors(
+            policies,
             options.terrain,
             options.robots,
             options.seconds,
             options.seed,
             options.density,
             options.level,
-            options.forward_only,
+            options.commands,
             workers,
             progress.show,
         )
-    wall = round(results.wall_seconds, 2)
-    data = {
-        "schema": SCHEMA,
-        "command": ["vinl", "eval-loco", *strip_command(argv)],
-        "config": results.config,
-        "policies": results.policies,
-        "environment": describe_environment(),
-        "aggregate": results.aggregate,
-        "robots": [asdict(record) for record in results.robots],
-        "timing": {"wall_seconds": wall, "workers": workers},
-    }
+    compared = dict(zip(label_policies(names), results, strict=True))
+    data = results_as_dict(compared, ["vinl", "eval-loco", *strip_command(argv)], workers)
     write_json(out / "results.json", data)
-    table = Table("figure", "value", show_header=False)
-    for key, value in results.aggregate.items():
-        if not isinstance(value, dict) and value is not None:
-            table.add_row(key, f"{value:.4g}")
-    console.print(table)
-    console.print(f"{wall:.0f} s; figures {out / 'results.json'}", soft_wrap=True)
+    if options.terrain == "blocks" and options.density > 0:
+        draw_contacts(compared, out / "contacts.png")
+    if options.compare:
+        print_comparison(console, compared)
+    else:
+        print_figures(console, results[0])
+    console.print(f"{results[0].wall_seconds:.0f} s; figures {out / 'results.json'}", soft_wrap=True)
     return 0

@@ -1,0 +1,172 @@
+"""What every robot of a trial goes through, whatever policy drives it: where it starts and what it is told, when."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from vinl.config.errors import InputError
+from vinl.config.fields import closest
+from vinl.evaluation.grounds import Ground
+from vinl.policies.policy import Policy
+from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
+
+START_CLEARANCE = 0.65
+"""No robot starts with its trunk nearer than this to the middle of a block [m]: all feet then stand on the floor."""
+
+_COMMAND_LIMIT = 1.0
+_START_STREAM, _COMMAND_STREAM = 0, 1
+
+
+@dataclass(frozen=True)
+class CommandRanges:
+    """Uniformly drawn commands.
+
+    Attributes:
+        forward, left: ranges of the linear velocity [m/s].
+        yaw_rate: range of the turning rate [rad/s].
+        min_speed: slower linear commands become zero [m/s].
+        hold: range of the time until the next command [s].
+        hold_step: the time is rounded to multiples of this [s].
+        stand_share: share of the commands that are zero.
+        turn_share: share of the commands that only turn on the spot.
+    """
+
+    forward: tuple[float, float] = (-1.0, 1.0)
+    left: tuple[float, float] = (-1.0, 1.0)
+    yaw_rate: tuple[float, float] = (-1.0, 1.0)
+    min_speed: float = 0.0
+    hold: tuple[float, float] = (5.0, 10.0)
+    hold_step: float = CONTROL_DT
+    stand_share: float = 0.0
+    turn_share: float = 0.0
+
+
+_LEVEL, _TURN = (0.0, 0.0), (-np.pi / 3, np.pi / 3)
+
+FIXED = {
+    "turns": CommandRanges((0.3, 1.0), _LEVEL),
+    "straight": CommandRanges((0.3, 1.0), _LEVEL, _LEVEL),
+    "spin": CommandRanges(_LEVEL, _LEVEL, _TURN),
+    "navigator": CommandRanges(
+        (0.0, 1.0), _LEVEL, _TURN, hold=(0.5, 4.0), hold_step=0.5, stand_share=0.1, turn_share=0.15
+    ),
+}
+"""Commands that do not depend on the policy, by name. ``navigator``: what a navigator at 2 Hz asks for."""
+
+COMMANDS = ("trained", "forward", *FIXED)
+"""``trained``: what the policies were trained for, at most +-1 m/s and +-1 rad/s; ``forward``: without sideways."""
+
+
+def choose_commands(name: str | None, terrain: str) -> str:
+    """The commands of that name; without one ``turns`` on blocks and ``trained`` elsewhere.
+
+    Raises:
+        InputError: the name is unknown.
+    """
+    name = name or ("turns" if terrain == "blocks" else "trained")
+    if name not in COMMANDS:
+        raise InputError(f"--commands {name!r} is unknown{closest(name, COMMANDS)}; known: {', '.join(COMMANDS)}")
+    return name
+
+
+def command_ranges(name: str, policies: Sequence[Policy]) -> CommandRanges:
+    """The ranges behind a name; for ``trained`` and ``forward`` what all the policies were trained for."""
+    if name in FIXED:
+        return FIXED[name]
+    trained = [policy.card.training.get("commands", {}) for policy in policies]
+
+    def common(key: str) -> tuple[float, float]:
+        ranges = [t.get(key, (-_COMMAND_LIMIT, _COMMAND_LIMIT)) for t in trained]
+        low = max(-_COMMAND_LIMIT, *(float(r[0]) for r in ranges))
+        high = min(_COMMAND_LIMIT, *(float(r[1]) for r in ranges))
+        if low > high:
+            raise InputError(f"the policies have no {key} command in common; give --commands turns or navigator")
+        return low, high
+
+    left = _LEVEL if name == "forward" else common("left")
+    slowest = max(float(t.get("min_speed", 0.2)) for t in trained)
+    return CommandRanges(common("forward"), left, common("yaw_rate"), slowest)
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A robot at rest.
+
+    Attributes:
+        x, y: of the trunk [m].
+        yaw: heading [rad].
+        joints: joint angles [rad].
+        ground: height of the ground there [m].
+    """
+
+    x: float
+    y: float
+    yaw: float
+    joints: Float[np.ndarray, "12"]
+    ground: float
+
+
+class Course:
+    """The way of one robot. Commands follow the clock, so that a fall changes nothing of what comes later.
+
+    Args:
+        ground: where.
+        ranges: what commands are drawn from.
+        seed: of the trial.
+        robot: number of the robot.
+        steps: control steps of the trial.
+
+    Attributes:
+        home: index into the ground's homes.
+        commands: (steps, 3) forward, left [m/s] and yaw rate [rad/s] at each control step.
+        fresh: (steps,) whether a new command begins with the step.
+    """
+
+    def __init__(self, ground: Ground, ranges: CommandRanges, seed: int, robot: int, steps: int) -> None:
+        self.robot, self.home = robot, robot % len(ground.homes)
+        self._ground, self._rng = ground, _stream(seed, robot, _START_STREAM)
+        self.commands, self.fresh = draw_commands(ranges, _stream(seed, robot, _COMMAND_STREAM), steps)
+
+    def draw_start(self) -> Start:
+        """The next start: the first of the trial, then one after every fall and at the end of the ground."""
+        ground, rng = self._ground, self._rng
+        home = ground.homes[self.home]
+        best, gap = home[:2], -np.inf
+        for _ in range(1000):
+            xy = home[:2] + rng.uniform(-ground.spread, ground.spread, 2)
+            free = np.inf
+            if len(ground.blocks):
+                free = float(np.linalg.norm(ground.blocks.rows[:, :2] - xy, axis=1).min())
+            if free > gap:
+                best, gap = xy, free
+            if gap > START_CLEARANCE:
+                break
+        joints = DEFAULT_POSE + rng.uniform(-0.05, 0.05, 12)
+        return Start(float(best[0]), float(best[1]), float(rng.uniform(-np.pi, np.pi)), joints, float(home[2]))
+
+
+def draw_commands(
+    ranges: CommandRanges, rng: np.random.Generator, steps: int
+) -> tuple[Float[np.ndarray, "steps 3"], np.ndarray]:
+    """Commands for so many control steps, and at which of them a new one begins."""
+    commands, fresh = np.zeros((steps, 3)), np.zeros(steps, bool)
+    step = 0
+    while step < steps:
+        command = np.array([rng.uniform(*ranges.forward), rng.uniform(*ranges.left), rng.uniform(*ranges.yaw_rate)])
+        share, hold = rng.uniform(), rng.uniform(*ranges.hold)
+        if np.hypot(command[0], command[1]) < ranges.min_speed or share < ranges.stand_share + ranges.turn_share:
+            command[:2] = 0.0
+        if share < ranges.stand_share:
+            command[2] = 0.0
+        commands[step:], fresh[step] = command, True
+        held = max(round(hold / ranges.hold_step), 1) * ranges.hold_step
+        step += max(round(held / CONTROL_DT), 1)
+    return commands, fresh
+
+
+def _stream(seed: int, robot: int, purpose: int) -> np.random.Generator:
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, robot, purpose])))

@@ -1,0 +1,68 @@
+"""Several robots in MuJoCo C, each in a world of its own, driven together."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float
+
+from vinl.evaluation.courses import Start
+from vinl.evaluation.touches import BlockReader, BlockTouches
+from vinl.evaluation.walker import Walker
+
+MAX_TILT = 1.2566
+"""A trunk tilted farther than this has fallen [rad]: 72 deg."""
+
+
+@runtime_checkable
+class Herd(Protocol):
+    """Robots in whatever simulator.
+
+    Attributes:
+        qpos: (n, 19), qvel: (n, 18) of all robots, as after the last step or start.
+        touches: what touched blocks in the last step.
+        fallen: (n,) who had fallen at the end of the last step.
+    """
+
+    qpos: Float[np.ndarray, "n 19"]
+    qvel: Float[np.ndarray, "n 18"]
+    touches: BlockTouches
+    fallen: Bool[np.ndarray, " n"]
+
+    def start(self, robot: int, start: Start) -> None:
+        """Put a robot somewhere, at rest."""
+        ...
+
+    def step(self, targets: Float[np.ndarray, "n 12"]) -> None:
+        """One control step to joint targets [rad]."""
+        ...
+
+
+class BoxHerd:
+    """Robots in MuJoCo C, where blocks are boxes."""
+
+    def __init__(self, model: mujoco.MjModel, n: int) -> None:
+        self.touches = BlockTouches.none(n)
+        self.fallen = np.zeros(n, bool)
+        self.qpos, self.qvel = np.zeros((n, 19)), np.zeros((n, 18))
+        self._walkers = [Walker(model) for _ in range(n)]
+        for k, walker in enumerate(self._walkers):
+            walker.contacts = BlockReader(model, walker.data, self.touches, k)
+
+    def start(self, robot: int, start: Start) -> None:
+        """Put a robot somewhere, at rest."""
+        self._walkers[robot].spawn(start.x, start.y, start.yaw, start.joints, start.ground)
+        self._read(robot)
+
+    def step(self, targets: Float[np.ndarray, "n 12"]) -> None:
+        """One control step to joint targets [rad]."""
+        for k, walker in enumerate(self._walkers):
+            walker.step(targets[k])
+            self.fallen[k] = walker.has_fallen(MAX_TILT)
+            self._read(k)
+
+    def _read(self, robot: int) -> None:
+        walker = self._walkers[robot]
+        self.qpos[robot], self.qvel[robot] = walker.qpos, walker.qvel

@@ -1,0 +1,136 @@
+"""What a locomotor's trial leaves behind: tables in the terminal, ``results.json``, a picture of the contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from vinl.evaluation.locomotor import LocomotorResults
+from vinl.evaluation.results_file import SCHEMA, describe_environment
+from vinl.evaluation.robot_records import HEIGHT_NAMES
+
+_COLUMNS = (
+    ("foot_block_per_m", "feet/m", 2),
+    ("foot_front_block_per_m", "front", 2),
+    ("foot_rear_block_per_m", "rear", 2),
+    ("leg_block_per_m", "legs/m", 2),
+    ("linear_velocity_rmse", "m/s", 3),
+    ("yaw_rate_rmse", "rad/s", 3),
+)
+"""Figures of the table: name, title, digits."""
+
+_SPREAD = ("foot_block_per_m", "leg_block_per_m")
+"""Figures whose interval the table shows, as half its width."""
+
+_BARS = (
+    ("foot_front_block_per_m", "front feet"),
+    ("foot_rear_block_per_m", "rear feet"),
+    ("leg_front_block_per_m", "front legs"),
+    ("leg_rear_block_per_m", "rear legs"),
+)
+
+
+def label_policies(names: Sequence[str]) -> list[str]:
+    """Short names for a table: of a folder its last part, of a run's ``policy`` folder the run's; whole if unclear."""
+    paths = [Path(name) for name in names]
+    short = [(p.parent.name if p.name == "policy" else p.name) or str(p) for p in paths]
+    return [s if short.count(s) == 1 else name for s, name in zip(short, names, strict=True)]
+
+
+def print_figures(console: Console, results: LocomotorResults) -> None:
+    """Every figure of one policy with its interval."""
+    table = Table("figure", "value", "95 %", box=box.SIMPLE_HEAD, pad_edge=False)
+    intervals = results.aggregate["ci95"]
+    for key, value in results.aggregate.items():
+        if isinstance(value, (int, float)):
+            low_high = intervals.get(key)
+            table.add_row(key, f"{value:.4g}", f"{low_high[0]:.3g} to {low_high[1]:.3g}" if low_high else "")
+    console.print(table)
+    _print_heights(console, {results.policies["locomotion"]["name"]: results})
+
+
+def print_comparison(console: Console, compared: Mapping[str, LocomotorResults]) -> None:
+    """One row for each policy."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("policy", overflow="fold")
+    for title in (*[title for _, title, _ in _COLUMNS], "falls", "fell"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for name, results in compared.items():
+        a, cells = results.aggregate, []
+        for key, _, digits in _COLUMNS:
+            interval = a["ci95"].get(key)
+            spread = f" ±{(interval[1] - interval[0]) / 2:.{digits}f}" if interval and key in _SPREAD else ""
+            cells.append("-" if a[key] is None else f"{a[key]:.{digits}f}{spread}")
+        table.add_row(name, *cells, str(a["fall_count"]), f"{100 * a['falls']:.1f} %")
+    console.print(table)
+    _print_heights(console, compared)
+
+
+def _print_heights(console: Console, compared: Mapping[str, LocomotorResults]) -> None:
+    key = "foot_block_per_m_by_height"
+    if not any(key in results.aggregate for results in compared.values()):
+        return
+    table = Table(title="feet/m, legs/m on blocks, were all blocks so high [m]", box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("policy", overflow="fold")
+    for name in HEIGHT_NAMES:
+        table.add_column(name, justify="right", no_wrap=True)
+    for name, results in compared.items():
+        rows = [results.aggregate[f"{limb}_block_per_m_by_height"] for limb in ("foot", "leg")]
+        table.add_row(name, *[", ".join("-" if r[h] is None else f"{r[h]:.2f}" for r in rows) for h in HEIGHT_NAMES])
+    console.print(table)
+
+
+def results_as_dict(compared: Mapping[str, LocomotorResults], command: Sequence[str], workers: int) -> dict[str, Any]:
+    """Results as plain data. One policy alone has its figures in ``aggregate``; of several each has its own in
+    ``compared``, and every robot's record names its policy."""
+    first = next(iter(compared.values()))
+    data: dict[str, Any] = {"schema": SCHEMA, "command": list(command), "config": first.config}
+    wall = round(first.wall_seconds, 2)
+    if len(compared) == 1:
+        data |= {"policies": first.policies, "environment": describe_environment(), "aggregate": first.aggregate}
+        data["robots"] = [asdict(record) for record in first.robots]
+    else:
+        data["environment"] = describe_environment()
+        data["compared"] = {
+            name: {"policies": r.policies, "ground": r.config["ground"], "aggregate": r.aggregate}
+            for name, r in compared.items()
+        }
+        data["robots"] = [{"policy": name, **asdict(record)} for name, r in compared.items() for record in r.robots]
+    data["timing"] = {"wall_seconds": wall, "workers": workers}
+    return data
+
+
+def draw_contacts(compared: Mapping[str, LocomotorResults], path: Path) -> None:
+    """Contacts per metre of front and rear feet and legs with their intervals, and of the feet by block height."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 4), layout="constrained")
+    FigureCanvasAgg(figure)
+    left, right = figure.subplots(1, 2)
+    width = 0.8 / len(compared)
+    for k, (name, results) in enumerate(compared.items()):
+        a, shift = results.aggregate, (k - (len(compared) - 1) / 2) * width
+        heights = np.array([a[key] or 0.0 for key, _ in _BARS])
+        bounds = np.array([a["ci95"].get(key) or (h, h) for (key, _), h in zip(_BARS, heights, strict=True)])
+        error = np.maximum(np.abs(bounds.T - heights), 0)
+        left.bar(np.arange(len(_BARS)) + shift, heights, width, yerr=error, capsize=2, label=name)
+        by_height = a.get("foot_block_per_m_by_height", {})
+        right.bar(np.arange(len(HEIGHT_NAMES)) + shift, [by_height.get(h) or 0.0 for h in HEIGHT_NAMES], width)
+    left.set_xticks(range(len(_BARS)), [title for _, title in _BARS])
+    left.set_ylabel("control steps on blocks per metre")
+    left.legend(frameon=False)
+    right.set_xticks(range(len(HEIGHT_NAMES)), HEIGHT_NAMES)
+    right.set_xlabel("height of the block [m]")
+    right.set_ylabel("feet on blocks per metre, were all so high")
+    for axes in (left, right):
+        axes.spines[["top", "right"]].set_visible(False)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=120)

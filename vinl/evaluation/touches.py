@@ -1,0 +1,90 @@
+"""Which foot and which leg touches which block, latched over the physics steps of one action."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool
+
+from vinl.evaluation.contact import ContactReader
+from vinl.evaluation.scene import BLOCKS
+from vinl.robot.aliengo import FOOT_GEOMS, LEGS
+
+HEIGHT_EDGES = (0.10, 0.12, 0.14, 0.16, 0.18, 0.20)
+"""Blocks are told apart by height in these bins [m]; lower and higher ones count in the first and the last."""
+
+BINS = len(HEIGHT_EDGES) - 1
+
+
+def bin_heights(heights: np.ndarray) -> np.ndarray:
+    """The bin of every height [m]."""
+    return np.clip(np.digitize(heights, HEIGHT_EDGES) - 1, 0, BINS - 1)
+
+
+class BlockTouches(NamedTuple):
+    """What touched blocks in one control step, robot by robot.
+
+    Attributes:
+        feet, legs: (n, 4) in the order of ``LEGS``; a leg is hip, thigh and shank.
+        foot_bins, leg_bins: (n, BINS) whether any foot, any leg touched a block of the bin.
+    """
+
+    feet: Bool[np.ndarray, "n 4"]
+    legs: Bool[np.ndarray, "n 4"]
+    foot_bins: Bool[np.ndarray, "n bins"]
+    leg_bins: Bool[np.ndarray, "n bins"]
+
+    @classmethod
+    def none(cls, n: int) -> BlockTouches:
+        """No touch."""
+        return cls(np.zeros((n, 4), bool), np.zeros((n, 4), bool), np.zeros((n, BINS), bool), np.zeros((n, BINS), bool))
+
+
+class BlockReader(ContactReader):
+    """Also notes which feet and legs touch blocks, and blocks of what height.
+
+    Args:
+        model: the world.
+        data: of one robot in it.
+        out: where to note it.
+        row: the robot's row there.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, out: BlockTouches, row: int) -> None:
+        self._out, self._row = out, row
+        limb, leg, height = np.full(model.ngeom, -1), np.zeros(model.ngeom, int), np.full(model.ngeom, -1)
+        blocks = model.body(BLOCKS).id
+        for g in range(model.ngeom):
+            body = model.body(model.geom_bodyid[g]).name
+            if model.geom_bodyid[g] == blocks:
+                height[g] = bin_heights(2 * model.geom_size[g, 2:])[0]
+            elif model.geom(g).name in FOOT_GEOMS:
+                limb[g], leg[g] = 0, FOOT_GEOMS.index(model.geom(g).name)
+            elif body.endswith(("_hip", "_thigh", "_calf")):
+                limb[g], leg[g] = 1, LEGS.index(body.split("_")[0])
+        self._limb, self._leg, self._height = limb, leg, height
+        super().__init__(model, data)
+
+    def clear(self) -> None:
+        """Forget the touches: a new control step begins."""
+        super().clear()
+        for flags in self._out:
+            flags[self._row] = False
+
+    def look(self) -> None:
+        """Latch what the last physics step touched."""
+        super().look()
+        if not self._touch[0]:
+            return
+        geoms = self._data.contact.geom
+        limb, height = self._limb[geoms].max(1), self._height[geoms].max(1)
+        for k in np.flatnonzero((limb >= 0) & (height >= 0)):
+            a, b = geoms[k]
+            leg = self._leg[a if self._limb[a] >= 0 else b]
+            by_leg, by_bin = (
+                (self._out.feet, self._out.foot_bins) if limb[k] == 0 else (self._out.legs, self._out.leg_bins)
+            )
+            by_leg[self._row, leg] = True
+            by_bin[self._row, height[k]] = True

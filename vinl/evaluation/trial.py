@@ -1,0 +1,119 @@
+"""One trial: a policy drives a herd along its courses, whatever simulator the herd lives in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from vinl.evaluation.courses import Course
+from vinl.evaluation.grounds import Ground
+from vinl.evaluation.herd import Herd
+from vinl.evaluation.robot_records import FRONT, REAR, RobotRecord
+from vinl.evaluation.touches import BlockTouches
+from vinl.evaluation.walker import joint_targets
+from vinl.policies.policy import Policy
+from vinl.robot.observation import observe
+from vinl.robot.rotation import rotate_inverse
+from vinl.sensing.height_scan import scan_ground
+
+SETTLED = 50
+"""Control steps after a new command, or a new start, that the ``settled`` errors leave out."""
+
+
+def run_trial(
+    herd: Herd,
+    ground: Ground,
+    courses: Sequence[Course],
+    policy: Policy,
+    is_stopped: Callable[[], bool] = lambda: False,
+) -> list[RobotRecord]:
+    """Drive all robots of a herd to the end of their commands.
+
+    A robot that falls, or comes to the end of its ground, starts afresh; its commands go on as they would have.
+
+    Args:
+        herd: one robot for each course.
+        ground: what the height scan reads, and how far robots may go.
+        courses: starts and commands.
+        policy: what drives them.
+        is_stopped: asked once a second whether to give up.
+
+    Returns:
+        What was counted, robot by robot.
+    """
+    n = len(courses)
+    records = [_new_record(ground, course) for course in courses]
+    homes = np.array([ground.homes[course.home, :2] for course in courses])
+    commands, fresh = np.stack([c.commands for c in courses], 1), np.stack([c.fresh for c in courses], 1)
+    policy.reset(n)
+    for k, course in enumerate(courses):
+        herd.start(k, course.draw_start())
+    actions, age = np.zeros((n, 12), np.float32), np.zeros(n, int)
+    for step in range(len(commands)):
+        if step % SETTLED == 0 and is_stopped():
+            break
+        age[fresh[step]] = 0
+        scan = scan_ground(np, ground.field.heights, ground.field.frame, herd.qpos)
+        actions = policy.act(observe(np, herd.qpos, herd.qvel, commands[step], actions, scan))
+        before = herd.qpos[:, :2].copy()
+        herd.step(joint_targets(actions, policy.card))
+        metres = np.linalg.norm(herd.qpos[:, :2] - before, axis=1)
+        _add_errors(records, herd.qpos, herd.qvel, commands[step], age >= SETTLED)
+        _add_touches(records, herd.touches, metres, herd.fallen)
+        age += 1
+        away = herd.fallen | (np.abs(herd.qpos[:, :2] - homes).max(1) > ground.reach)
+        for k in np.flatnonzero(away).tolist():
+            herd.start(k, courses[k].draw_start())
+            actions[k], age[k] = 0, 0
+        if away.any():
+            policy.reset(away)
+    return records
+
+
+def _new_record(ground: Ground, course: Course) -> RobotRecord:
+    level = int(ground.levels[course.home])
+    return RobotRecord(course.robot, ground.kinds[course.home], level if level >= 0 else None)
+
+
+def _add_touches(
+    records: Sequence[RobotRecord],
+    touches: BlockTouches,
+    metres: Float[np.ndarray, " n"],
+    fallen: Bool[np.ndarray, " n"],
+) -> None:
+    for k, record in enumerate(records):
+        record.metres += float(metres[k])
+        record.falls += int(fallen[k])
+    for k in np.flatnonzero(touches.feet.any(1) | touches.legs.any(1)).tolist():
+        record = records[k]
+        record.foot_block_steps += int(touches.feet[k].any())
+        record.leg_block_steps += int(touches.legs[k].any())
+        for j, pair in enumerate((FRONT, REAR)):
+            record.foot_pair_steps[j] += int(touches.feet[k, pair].any())
+            record.leg_pair_steps[j] += int(touches.legs[k, pair].any())
+        for j in np.flatnonzero(touches.foot_bins[k]).tolist():
+            record.foot_height_steps[j] += 1
+        for j in np.flatnonzero(touches.leg_bins[k]).tolist():
+            record.leg_height_steps[j] += 1
+
+
+def _add_errors(
+    records: Sequence[RobotRecord],
+    qpos: Float[np.ndarray, "n 19"],
+    qvel: Float[np.ndarray, "n 18"],
+    command: Float[np.ndarray, "n 3"],
+    settled: Bool[np.ndarray, " n"],
+) -> None:
+    """Squared errors of the velocity in the trunk frame, which training rewards, and of the yaw rate."""
+    velocity = rotate_inverse(np, qpos[:, 3:7], qvel[:, :3])
+    linear, yaw = ((velocity[:, :2] - command[:, :2]) ** 2).sum(1), (qvel[:, 5] - command[:, 2]) ** 2
+    for record, a, b, calm in zip(records, linear.tolist(), yaw.tolist(), settled.tolist(), strict=True):
+        record.steps += 1
+        record.errors[0] += a
+        record.errors[1] += b
+        if calm:
+            record.settled_steps += 1
+            record.errors[2] += a
+            record.errors[3] += b
