@@ -1,0 +1,146 @@
+"""The navigator's network and how it learns, as frozen records (sections ``network`` and ``ppo`` of a config)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from vinl.config.errors import InputError
+
+SCHEDULES = ("adaptive", "linear", "constant")
+VISIONS, MEMORIES = ("resnet18", "cnn"), ("lstm", "mlp")
+IMAGE_TYPES = ("float16", "uint8")
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """Sizes of the navigator [ViNL resnet_policy.py]. A config without camera gets no image part.
+
+    Attributes:
+        vision: ``resnet18`` or ``cnn`` (three convolutions).
+        planes: channels of the ResNet's first stage.
+        visual: numbers that the image becomes.
+        embedding: numbers that goal and previous action become, each.
+        hidden, layers: width and layers of the memory.
+        memory: ``lstm``, or ``mlp``, which remembers nothing.
+        values: width of a layer of the critic's own between feature and value; 0: none.
+        privileged: the critic also sees the geodesic distance to the goal, which the robot does not know.
+    """
+
+    vision: str = "resnet18"
+    planes: int = 32
+    visual: int = 512
+    embedding: int = 32
+    hidden: int = 512
+    layers: int = 2
+    memory: str = "lstm"
+    values: int = 0
+    privileged: bool = False
+
+    def __post_init__(self) -> None:
+        if self.vision not in VISIONS:
+            raise InputError(f"network.vision must be one of {', '.join(VISIONS)}, got {self.vision!r}")
+        if self.memory not in MEMORIES:
+            raise InputError(f"network.memory must be one of {', '.join(MEMORIES)}, got {self.memory!r}")
+        for name in ("planes", "visual", "embedding", "hidden", "layers"):
+            if getattr(self, name) < 1:
+                raise InputError(f"network.{name} must be at least 1, got {getattr(self, name)}")
+        if self.values < 0:
+            raise InputError(f"network.values must not be negative, got {self.values}")
+        if self.planes % 16 and self.vision == "resnet18":
+            raise InputError(f"network.planes must be a multiple of 16 (groups of the norms), got {self.planes}")
+
+
+@dataclass(frozen=True)
+class PpoConfig:
+    """Proximal policy optimisation over whole sequences.
+
+    Attributes:
+        steps: steps of each robot between updates; also how far back errors go through the memory.
+        epochs, minibatches: passes over the roll-out and parts (of robots) of each.
+        learning_rate: at the start.
+        schedule: ``adaptive`` follows ``desired_kl`` within ``min_rate`` and ``max_rate``; ``linear`` falls from
+            ``learning_rate`` to ``last_rate``; ``constant`` stays.
+        desired_kl: divergence of an update that the adaptive rate is steered to.
+        adapt_each: steer after every minibatch [rsl-rl]; otherwise once an update.
+        min_rate, max_rate: limits of the adaptive rate; without a floor the divergence of ever surer actions brings
+            it, and learning with it, to a halt.
+        cool_from: from this share of the iterations on the limits fall, linearly, towards ``last_rate``; 1: never.
+        last_rate: learning rate at the end, see ``cool_from`` and ``schedule``.
+        gamma, lam: discount and GAE factor.
+        clip: of the probability ratio and of the value.
+        value: weight of the value loss.
+        entropy, last_entropy: weight of the entropy bonus at the start and, moving from ``cool_from`` on, at the end;
+            null: it stays.
+        max_grad_norm: gradients are clipped to this norm.
+        log_std, log_std_range: logarithm of the actions' standard deviation at the start, and its limits.
+        image_type: how the roll-out keeps images: ``float16``, or ``uint8`` in half the memory.
+        bf16: images in bfloat16 (GPU only).
+        compiled: image network through ``torch.compile`` (GPU only): a minute at the start, then faster.
+        graphs: minibatches as a CUDA graph (one GPU only).
+    """
+
+    steps: int = 24
+    epochs: int = 2
+    minibatches: int = 4
+    learning_rate: float = 5e-4
+    schedule: str = "adaptive"
+    desired_kl: float = 0.01
+    adapt_each: bool = False
+    min_rate: float = 2e-4
+    max_rate: float = 1.5e-3
+    cool_from: float = 0.7
+    last_rate: float = 5e-5
+    gamma: float = 0.99
+    lam: float = 0.95
+    clip: float = 0.2
+    value: float = 0.5
+    entropy: float = 0.003
+    last_entropy: float | None = None
+    max_grad_norm: float = 0.5
+    log_std: float = -0.5
+    log_std_range: tuple[float, float] = (-2.0, 0.2)
+    image_type: str = "float16"
+    bf16: bool = True
+    compiled: bool = True
+    graphs: bool = False
+
+    def __post_init__(self) -> None:
+        if min(self.steps, self.epochs, self.minibatches) < 1:
+            raise InputError("ppo: steps, epochs and minibatches must be at least 1")
+        if self.schedule not in SCHEDULES:
+            raise InputError(f"ppo.schedule must be one of {', '.join(SCHEDULES)}, got {self.schedule!r}")
+        if self.image_type not in IMAGE_TYPES:
+            raise InputError(f"ppo.image_type must be one of {', '.join(IMAGE_TYPES)}, got {self.image_type!r}")
+        if not 0 < self.min_rate <= self.learning_rate <= self.max_rate:
+            raise InputError("ppo: need 0 < min_rate <= learning_rate <= max_rate")
+        for name in ("desired_kl", "last_rate", "clip", "max_grad_norm"):
+            if not getattr(self, name) > 0:
+                raise InputError(f"ppo.{name} must be positive, got {getattr(self, name)}")
+        for name in ("value", "entropy", "last_entropy"):
+            if (getattr(self, name) or 0.0) < 0:
+                raise InputError(f"ppo.{name} must not be negative, got {getattr(self, name)}")
+        if not 0 < self.gamma <= 1 or not 0 <= self.lam <= 1 or not 0 <= self.cool_from <= 1:
+            raise InputError("ppo: gamma must lie in (0, 1], lam and cool_from in [0, 1]")
+        low, high = self.log_std_range
+        if not low <= self.log_std <= high or not math.isfinite(low + high):
+            raise InputError(f"ppo.log_std must lie within log_std_range {low:g} to {high:g}, got {self.log_std:g}")
+
+    def rate_limits(self, share: float) -> tuple[float, float]:
+        """Lowest and highest learning rate after a share of the iterations."""
+        if self.schedule == "linear":
+            rate = self.learning_rate + share * (self.last_rate - self.learning_rate)
+            return rate, rate
+        adaptive = self.schedule == "adaptive"
+        low, high = (self.min_rate, self.max_rate) if adaptive else (self.learning_rate, self.learning_rate)
+        cooled = self._cooled(share)
+        low += cooled * (min(self.last_rate, low) - low)
+        return low, max(low, high + cooled * (self.last_rate - high))
+
+    def entropy_at(self, share: float) -> float:
+        """Weight of the entropy bonus after a share of the iterations."""
+        last = self.entropy if self.last_entropy is None else self.last_entropy
+        return self.entropy + self._cooled(share) * (last - self.entropy)
+
+    def _cooled(self, share: float) -> float:
+        return min(max((share - self.cool_from) / (1.0 - self.cool_from), 0.0), 1.0) if self.cool_from < 1 else 0.0
