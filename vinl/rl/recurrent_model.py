@@ -1,0 +1,106 @@
+"""An actor with memory and a critic on the same feature, as PPO trains them."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, cast
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor, nn
+
+from vinl.policies.depth_memory import State
+from vinl.policies.networks import PolicyNetwork
+
+
+class MemoryActor(Protocol):
+    """What a ``PolicyNetwork`` needs to be trained with a critic beside it (``NavActor`` has it).
+
+    Attributes:
+        image: (height, width) of the depth image [pixels], or None if blind.
+        feature_size: numbers in a feature.
+    """
+
+    image: tuple[int, int] | None
+    feature_size: int
+    observation_size: int
+    action_size: int
+
+    def initial_state(self, n: int, device: Any = None) -> State:
+        """The memory of n robots that have seen nothing."""
+        ...
+
+    def look(self, depth: Any, vector: Any, state: State, fresh: Any) -> tuple[Any, State]:
+        """Features (t, n, f) of t steps and the last state."""
+        ...
+
+    def choose(self, feature: Any) -> Any:
+        """Mean actions (t, n, a)."""
+        ...
+
+
+class RecurrentActorCritic(nn.Module):
+    """Shared trunk, two heads: the actor's mean and the value. The actions' spread does not depend on the state.
+
+    Args:
+        actor: a ``MemoryActor``.
+        log_std: logarithm of the actions' standard deviation at the start.
+        log_std_range: it is held within these.
+        privileged: numbers that only the critic sees.
+        values: width of a layer between feature and value; 0: none.
+    """
+
+    def __init__(
+        self,
+        actor: PolicyNetwork,
+        log_std: float = -0.5,
+        log_std_range: tuple[float, float] = (-2.0, 0.2),
+        privileged: int = 0,
+        values: int = 0,
+    ) -> None:
+        super().__init__()
+        self.actor = actor
+        self.privileged = privileged
+        self.log_std = nn.Parameter(torch.full((actor.action_size,), float(log_std)))
+        self._log_std_range = log_std_range
+        width = cast(MemoryActor, actor).feature_size + privileged
+        self.value = nn.Sequential(*([nn.Linear(width, values), nn.ELU()] if values else []))
+        self.value.append(nn.Linear(values or width, 1))
+        for layer in self.value:
+            if isinstance(layer, nn.Linear):
+                nn.init.orthogonal_(layer.weight)
+                nn.init.zeros_(layer.bias)
+
+    def forward(
+        self,
+        depth: Tensor | None,
+        vector: Float[Tensor, "t n k"],
+        state: State,
+        fresh: Bool[Tensor, "t n"],
+        privileged: Float[Tensor, "t n p"] | None = None,
+    ) -> tuple[Float[Tensor, "t n a"], Float[Tensor, "t n"], State]:
+        """Mean actions and values of t steps, and the last state; images in [0, 1] or as bytes."""
+        actor = cast(MemoryActor, self.actor)
+        feature, state = actor.look(as_unit(depth), vector, state, fresh)
+        feature = feature.float()
+        with torch.autocast(feature.device.type, enabled=False):
+            seen = feature if privileged is None else torch.cat([feature, privileged.float()], -1)
+            return actor.choose(feature), self.value(seen)[..., 0], state
+
+    @torch.no_grad()
+    def hold_spread(self) -> None:
+        """Keep the actions' spread within its range. A clamp inside ``forward`` would stop its gradient for good."""
+        self.log_std.clamp_(*self._log_std_range)
+
+    @property
+    def output_std(self) -> Float[Tensor, " a"]:
+        """Standard deviation of the actions."""
+        return self.log_std.exp()
+
+
+def as_unit(depth: Tensor | None) -> Tensor | None:
+    """Stored images as numbers in [0, 1] of the type that the network computes in."""
+    if depth is None:
+        return None
+    kind = depth.device.type
+    wanted = torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else torch.float32
+    return depth.to(wanted) / 255.0 if depth.dtype == torch.uint8 else depth.to(wanted)

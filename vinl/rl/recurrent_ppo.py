@@ -1,0 +1,323 @@
+"""PPO for networks with memory and images, without waiting for the device inside roll-out or update.
+
+rsl-rl's recurrent PPO pads trajectories and reads the learning rate and the losses from the device at every minibatch.
+Here minibatches are whole robots with all their steps: the network gets the images of all steps at once, its memory
+from the start of the roll-out, and flags where an episode begins. The interface is that of rsl-rl's ``PPO``.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from tensordict import TensorDict
+from torch import Tensor, nn
+
+from vinl.config.errors import InputError
+from vinl.rl.learning_rate import DeviceRate
+from vinl.rl.parallel import Peers
+from vinl.rl.recurrent_model import RecurrentActorCritic
+from vinl.rl.recurrent_storage import RecurrentStorage
+
+_LOG_2PI = math.log(2.0 * math.pi)
+_SUMS = ("surrogate", "value", "entropy", "kl", "clipped", "gradient_norm")
+"""What is added up on the device over an update."""
+
+
+@dataclass
+class RecurrentPpoSettings:
+    """Settings of the algorithm; ``learning_rate`` and the rest of the rate's are ``DeviceRate``'s.
+
+    Attributes:
+        epochs, minibatches: passes over the roll-out and parts (of robots) of each.
+        gamma, lam: discount and GAE factor.
+        clip: of the probability ratio and of the value.
+        value: weight of the value loss.
+        entropy: weight of the entropy bonus.
+        max_grad_norm: gradients are clipped to this norm.
+        reward_scale: rewards are multiplied by this.
+        bf16: images in bfloat16 (GPU only).
+        compiled: the image network through ``torch.compile`` (GPU only).
+        graphs: minibatch steps as one CUDA graph (one GPU only).
+        adapt_each: steer the learning rate after every minibatch, as rsl-rl does; else once an update.
+    """
+
+    epochs: int = 2
+    minibatches: int = 4
+    gamma: float = 0.99
+    lam: float = 0.95
+    clip: float = 0.2
+    value: float = 0.5
+    entropy: float = 0.003
+    max_grad_norm: float = 0.5
+    reward_scale: float = 1.0
+    bf16: bool = True
+    compiled: bool = False
+    graphs: bool = False
+    adapt_each: bool = False
+
+
+class RecurrentPPO:
+    """Learns from roll-outs of a ``RecurrentActorCritic``.
+
+    Observations are a ``TensorDict`` with ``vector`` (n, k), ``depth`` (n, H, W) in [0, 1] unless the actor is blind,
+    and ``privileged`` (n, p) if the critic takes it.
+
+    Args:
+        model: actor and critic, on the device.
+        storage: the roll-out's buffers.
+        rate: the learning rate.
+        settings: of the algorithm.
+        peers: the other processes of the training.
+    """
+
+    def __init__(
+        self,
+        model: RecurrentActorCritic,
+        storage: RecurrentStorage,
+        rate: DeviceRate,
+        settings: RecurrentPpoSettings,
+        peers: Peers | None = None,
+    ) -> None:
+        if storage.robots % settings.minibatches:
+            raise InputError(f"num_envs {storage.robots} must be a multiple of ppo.minibatches {settings.minibatches}")
+        self.model, self.storage, self.rate, self.settings = model, storage, rate, settings
+        self.peers = peers or Peers()
+        self.peers.share(model)
+        self.device = storage.vector.device
+        on_gpu = self.device.type == "cuda"
+        self._bf16 = settings.bf16 and on_gpu
+        # one kernel for all weights; the rate lies on the device, so that no step waits for it
+        self.optimizer = torch.optim.Adam(
+            model.parameters(),
+            lr=rate.value,
+            eps=1e-5,
+            fused=True,
+            capturable=on_gpu,  # type: ignore[arg-type]
+        )
+        rate.bind(self.optimizer)
+        if settings.compiled and on_gpu:
+            _compile_vision(model)
+        self._graph = _MinibatchGraph(self._learn) if settings.graphs and on_gpu and self.peers.count == 1 else None
+        self._state = tuple(part.clone() for part in storage.state)
+        self._fresh = torch.ones(storage.robots, dtype=torch.bool, device=self.device)
+        self._sums = torch.zeros(len(_SUMS), device=self.device)
+        self._kl = torch.zeros((), device=self.device)
+        self._step = 0
+
+    @property
+    def learning_rate(self) -> float:
+        """The present rate; waits for the device."""
+        return self.rate.read()
+
+    @property
+    def entropy_coef(self) -> float:
+        """Weight of the entropy bonus."""
+        return self.settings.entropy
+
+    def act(self, observation: TensorDict) -> Tensor:
+        """Sampled actions (n, a); the observation is stored."""
+        st, t = self.storage, self._step
+        if t == 0:
+            st.begin(self._state, self.model.log_std)
+        depth, privileged = self._keep(observation, t)
+        st.fresh[t] = self._fresh
+        with torch.no_grad(), self._precision():
+            mean, value, state = self.model(depth, st.vector[t][None], self._state, self._fresh[None], privileged)
+        self._remember(state)
+        mean, noise = mean[0], torch.randn_like(mean[0])
+        st.means[t], st.values[t] = mean, value[0]
+        torch.addcmul(mean, noise, st.log_std.exp(), out=st.actions[t])
+        st.log_prob[t] = _log_prob(st.actions[t], mean, st.log_std)
+        return st.actions[t]
+
+    def process_env_step(
+        self, observation: TensorDict, rewards: Tensor, dones: Tensor, extras: dict[str, Tensor]
+    ) -> None:
+        """What came of the actions: rewards (n,), dones (n,), ``time_outs`` (n,) in ``extras``."""
+        st, t = self.storage, self._step
+        st.rewards[t] = rewards * self.settings.reward_scale
+        if "time_outs" in extras:  # an episode cut off by the clock would have gone on
+            st.rewards[t] += self.settings.gamma * st.values[t] * extras["time_outs"].float()
+        st.done[t] = dones.bool()
+        self._fresh.copy_(dones)
+        self._step += 1
+
+    def compute_returns(self, observation: TensorDict) -> None:
+        """Advantages of the roll-out, normalised; ``observation`` is the one after its last step."""
+        st, s = self.storage, self.settings
+        depth = st.as_stored(observation["depth"])[None] if st.depth is not None else None
+        privileged = observation["privileged"][None] if st.privileged is not None else None
+        with torch.no_grad(), self._precision():
+            _, value, _ = self.model(depth, observation["vector"][None], self._state, self._fresh[None], privileged)
+        st.estimate_advantages(value[0], s.gamma, s.lam)
+        mean = st.advantages.mean()
+        self.peers.average(mean)
+        square = (st.advantages - mean).square().mean()
+        self.peers.average(square)
+        st.advantages.sub_(mean).div_(square.sqrt() + 1e-8)
+
+    def update(self) -> dict[str, float]:
+        """Learn from the roll-out; the losses are read once, at the end.
+
+        Raises:
+            FloatingPointError: the loss is no longer finite.
+        """
+        s, n = self.settings, self.storage.robots
+        self._sums.zero_()
+        for _ in range(s.epochs):
+            self._kl.zero_()
+            for robots in torch.randperm(n, device=self.device).chunk(s.minibatches):
+                if self._graph is None:
+                    self._learn(robots)
+                else:
+                    self._graph.run(robots)
+        if not s.adapt_each:
+            kl = self._kl / s.minibatches
+            self.peers.average(kl)
+            self.rate.steer(kl)
+        self._step = 0
+        means = (self._sums / (s.epochs * s.minibatches)).tolist()
+        if not all(math.isfinite(x) for x in means):
+            raise FloatingPointError(
+                "the loss is not finite; go on from the last checkpoint with a lower learning rate"
+            )
+        return dict(zip(_SUMS, means, strict=True))
+
+    def get_policy(self) -> RecurrentActorCritic:
+        """The model."""
+        return self.model
+
+    def train_mode(self) -> None:
+        """No layer of the model acts differently in training."""
+        self.model.train()
+
+    def eval_mode(self) -> None:
+        """See ``train_mode``."""
+        self.model.eval()
+
+    def save(self) -> dict[str, Any]:
+        """Weights, optimiser, rate, and the memory of the robots."""
+        return {
+            "model": self.model.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+            "learning_rate": self.rate.read(),
+            "memory": [part.clone() for part in self._state],
+            "fresh": self._fresh.clone(),
+        }
+
+    def load(self, saved: dict[str, Any], load_cfg: dict[str, bool] | None = None, strict: bool = True) -> bool:
+        """Go on from what ``save`` returned; robots of another number begin new episodes of memory."""
+        self.model.load_state_dict(saved["model"], strict=strict)
+        self.optimizer.load_state_dict(copy.deepcopy(saved["optimizer"]))
+        self.rate.set(saved["learning_rate"])
+        self.rate.bind(self.optimizer)
+        if len(saved["fresh"]) == len(self._fresh):
+            self._remember(tuple(saved["memory"]))
+            self._fresh.copy_(saved["fresh"])
+        return True
+
+    def _keep(self, observation: TensorDict, t: int) -> tuple[Tensor | None, Tensor | None]:
+        """Store the observation of step t; returns image and privileged numbers as (1, n, ...)."""
+        st = self.storage
+        st.vector[t] = observation["vector"]
+        depth = privileged = None
+        if st.depth is not None:
+            st.depth[t] = st.as_stored(observation["depth"])
+            depth = st.depth[t][None]
+        if st.privileged is not None:
+            st.privileged[t] = observation["privileged"]
+            privileged = st.privileged[t][None]
+        return depth, privileged
+
+    def _remember(self, state: tuple[Tensor, ...]) -> None:
+        for part, now in zip(self._state, state, strict=True):
+            part.copy_(now)
+
+    def _precision(self) -> torch.autocast:
+        return torch.autocast(self.device.type, torch.bfloat16, enabled=self._bf16)
+
+    def _learn(self, robots: Tensor) -> None:
+        """One step of the optimiser on all steps of some robots."""
+        s, st, model = self.settings, self.storage, self.model
+        batch = st.take(robots)
+        with self._precision():
+            mean, value, _ = model(batch.depth, batch.vector, batch.state, batch.fresh, batch.privileged)
+        log_std = model.log_std
+        log_ratio = _log_prob(batch.actions, mean, log_std) - batch.log_prob
+        ratio = log_ratio.exp()
+        bounded = ratio.clamp(1.0 - s.clip, 1.0 + s.clip)
+        surrogate = -torch.min(ratio * batch.advantages, bounded * batch.advantages).mean()
+        near = batch.values + (value - batch.values).clamp(-s.clip, s.clip)
+        value_loss = torch.max((value - batch.returns).square(), (near - batch.returns).square()).mean()
+        entropy = (log_std + 0.5 * (1.0 + _LOG_2PI)).sum()
+        loss = surrogate + s.value * value_loss - s.entropy * entropy
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        self.peers.average_gradients(model.parameters())
+        norm = nn.utils.clip_grad_norm_(model.parameters(), s.max_grad_norm)
+        self.optimizer.step()
+        model.hold_spread()
+        with torch.no_grad():
+            kl = _divergence(batch.means, st.log_std, mean, log_std).mean()
+            clipped = (bounded != ratio).float().mean()
+            self._kl += kl
+            self._sums += torch.stack([surrogate, value_loss, entropy, kl, clipped, norm])
+            if s.adapt_each:
+                self.peers.average(kl)
+                self.rate.steer(kl)
+
+
+class _MinibatchGraph:
+    """Minibatch steps recorded once as a CUDA graph and replayed: no launch of single kernels.
+
+    The first steps run as they are, on a stream of their own, so that libraries set up what they need.
+    """
+
+    _WARM_UP = 3
+
+    def __init__(self, learn: Any) -> None:
+        self._learn, self._count = learn, 0
+        self._graph: torch.cuda.CUDAGraph | None = None
+        self._robots: Tensor | None = None
+
+    def run(self, robots: Tensor) -> None:
+        """One step on these robots; their number stays the same from call to call."""
+        self._count += 1
+        if self._robots is None:
+            self._robots = robots.clone()
+        self._robots.copy_(robots)
+        if self._graph is None and self._count <= self._WARM_UP:
+            side = torch.cuda.Stream()
+            side.wait_stream(torch.cuda.current_stream())
+            with torch.cuda.stream(side):
+                self._learn(self._robots)
+            torch.cuda.current_stream().wait_stream(side)
+            return
+        if self._graph is None:
+            self._graph = torch.cuda.CUDAGraph()
+            with torch.cuda.graph(self._graph):
+                self._learn(self._robots)
+        self._graph.replay()
+
+
+def _compile_vision(model: RecurrentActorCritic) -> None:
+    """Fuse norms, additions and type changes between the convolutions; the names of the weights stay."""
+    memory = getattr(model.actor, "memory", None)
+    vision = getattr(memory, "vision", None)
+    if isinstance(vision, nn.Module):
+        vision.compile(dynamic=False)
+
+
+def _log_prob(action: Tensor, mean: Tensor, log_std: Tensor) -> Tensor:
+    """Logarithm of the density of a diagonal normal distribution, (..., a) to (...)."""
+    return (-0.5 * ((action - mean) * (-log_std).exp()).square() - log_std - 0.5 * _LOG_2PI).sum(-1)
+
+
+def _divergence(mean_a: Tensor, log_std_a: Tensor, mean_b: Tensor, log_std_b: Tensor) -> Tensor:
+    """KL(a || b) of diagonal normal distributions, (..., a) to (...)."""
+    variance = (2.0 * log_std_a).exp() + (mean_a - mean_b).square()
+    return (log_std_b - log_std_a + 0.5 * variance * (-2.0 * log_std_b).exp() - 0.5).sum(-1)
