@@ -1,57 +1,28 @@
-"""The training loop around rsl-rl's PPO: curves, checkpoints, an interrupt that saves."""
+"""The training loop around rsl-rl's algorithms."""
 
 from __future__ import annotations
 
 import contextlib
 import copy
 import io
-import signal
-import time
-from collections.abc import Callable, Iterator
-from types import FrameType
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Callable
+from typing import Any
 
 import torch
 from rsl_rl.env import VecEnv
 from rsl_rl.runners import OnPolicyRunner
-from torch.utils.tensorboard import SummaryWriter
 
-from vinl.config.errors import InputError
-from vinl.rl.progress import TrainingProgress
+from vinl.rl.loop import Figures, TrainingLoop
 from vinl.rl.run_folder import RunFolder
 
-Figures = Callable[[dict[str, float]], dict[str, str]]
 
-
-@runtime_checkable
-class TrainingEnv(Protocol):
-    """What the loop needs of an environment beside rsl-rl's ``VecEnv``."""
-
-    def read_measures(self) -> dict[str, float]:
-        """Means since the last call."""
-        ...
-
-    def save_state(self) -> dict[str, Any]:
-        """Tensors and plain data that ``load_state`` takes back."""
-        ...
-
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Go on from a saved state."""
-        ...
-
-
-class TrainingRunner(OnPolicyRunner):
-    """rsl-rl's runner with our loop: nothing waits for the device inside a roll-out.
+class TrainingRunner(TrainingLoop, OnPolicyRunner):
+    """rsl-rl's runner, which builds models and algorithm, with our loop.
 
     Args:
         env: an rsl-rl environment that is a ``TrainingEnv`` too.
         settings: rsl-rl's configuration; a copy is used, because rsl-rl changes its own.
-        folder: of the run.
-        device: torch device.
-        export: called after every checkpoint with the samples so far; writes the policy.
-        schedule: called before every iteration with the algorithm and the share of iterations done, to move settings.
-        figures: picks what the progress bar shows from an iteration's measures.
-        save_every: seconds between checkpoints.
+        rest: as for ``TrainingLoop``.
     """
 
     def __init__(
@@ -66,11 +37,9 @@ class TrainingRunner(OnPolicyRunner):
         save_every: float = 60.0,
     ) -> None:
         with contextlib.redirect_stdout(io.StringIO()):  # rsl-rl prints its models
-            super().__init__(env, copy.deepcopy(settings), None, device)
-        self.folder, self.export, self.figures = folder, export, figures
-        self.schedule, self.save_every = schedule, save_every
-        self.samples = 0
-        self._stop = False
+            OnPolicyRunner.__init__(self, env, copy.deepcopy(settings), None, device)
+        steps = settings["num_steps_per_env"]
+        TrainingLoop.__init__(self, env, self.alg, steps, folder, device, export, figures, schedule, save_every)
 
     def start_from(self, actor: dict[str, torch.Tensor], critic: dict[str, torch.Tensor] | None) -> None:
         """Take over trained weights; what they leave out, such as the actions' spread, stays as it was made.
@@ -85,127 +54,6 @@ class TrainingRunner(OnPolicyRunner):
             False,
         )
 
-    def resume(self) -> bool:
-        """Take up the folder's checkpoint, if there is one.
-
-        Raises:
-            InputError: the checkpoint is broken or of another network.
-        """
-        checkpoint = self.folder.load_checkpoint()
-        if checkpoint is None:
-            self.folder.cut_metrics(-1)
-            return False
-        try:
-            self.alg.load(checkpoint["algorithm"], None, True)
-            self.env.load_state(checkpoint["environment"])  # type: ignore[attr-defined]
-            self.current_learning_iteration, self.samples = checkpoint["iteration"], checkpoint["samples"]
-            _set_random_state(checkpoint["random"])
-        except (KeyError, RuntimeError, ValueError) as error:
-            raise InputError(
-                f"{self.folder.path}: the checkpoint does not fit this run ({str(error).splitlines()[0]})"
-            ) from None
-        self.folder.cut_metrics(self.current_learning_iteration)
-        return True
-
-    def checkpoint(self) -> None:
-        """Write the checkpoint and the policy."""
-        self.folder.save_checkpoint(
-            {
-                "algorithm": self.alg.save(),
-                "environment": self.env.save_state(),  # type: ignore[attr-defined]
-                "iteration": self.current_learning_iteration,
-                "samples": self.samples,
-                "random": _random_state(),
-            }
-        )
-        self.export(self.alg.get_policy(), self.samples)
-
-    def train(self, iterations: int) -> bool:
-        """Go on until ``iterations`` are done in all, or an interrupt asks to stop; both save.
-
-        Returns:
-            Whether all iterations are done.
-        """
-        steps = self.cfg["num_steps_per_env"]
-        first = self.current_learning_iteration
-        writer = SummaryWriter(str(self.folder.path / "tensorboard"), purge_step=first)
-        observation = self.env.get_observations().to(self.device)
-        self.alg.train_mode()
-        saved = time.monotonic()
-        with TrainingProgress(iterations, first) as progress, self._interruptible(progress):
-            while self.current_learning_iteration < iterations and not self._stop:
-                start = time.perf_counter()
-                self.schedule(self.alg, self.current_learning_iteration / iterations)
-                observation = self._roll_out(observation, steps)
-                collected = time.perf_counter()
-                losses = self.alg.update()
-                self.current_learning_iteration += 1
-                self.samples += steps * self.env.num_envs
-                measures = self.env.read_measures()  # type: ignore[attr-defined]
-                end = time.perf_counter()
-                row = {
-                    "iteration": self.current_learning_iteration,
-                    "samples": self.samples,
-                    "samples_per_second": steps * self.env.num_envs / (end - start),
-                    "update_seconds": end - collected,
-                    "seconds": end - start,
-                    "learning_rate": self.alg.learning_rate,
-                    "action_std": self.alg.get_policy().output_std.mean().item(),
-                    **{f"loss/{name}": float(value) for name, value in losses.items()},
-                    **measures,
-                }
-                self.folder.append_metrics(
-                    {k: float(f"{v:.6g}") if isinstance(v, float) else v for k, v in row.items()}
-                )
-                for name, value in row.items():
-                    writer.add_scalar(name if "/" in name else f"train/{name}", value, self.current_learning_iteration)
-                progress.show(self.current_learning_iteration, self.figures(row))
-                if time.monotonic() - saved > self.save_every:
-                    self.checkpoint()
-                    saved = time.monotonic()
-            self.checkpoint()
-        writer.close()
-        return self.current_learning_iteration >= iterations
-
-    def _roll_out(self, observation: Any, steps: int) -> Any:
-        with torch.inference_mode():
-            for _ in range(steps):
-                actions = self.alg.act(observation)
-                observation, rewards, dones, extras = self.env.step(actions)
-                self.alg.process_env_step(observation, rewards, dones, extras)
-            self.alg.compute_returns(observation)
-        return observation
-
-    @contextlib.contextmanager
-    def _interruptible(self, progress: TrainingProgress) -> Iterator[None]:
-        """The first Ctrl-C (or SIGTERM) ends the loop after the iteration; a second Ctrl-C ends it at once."""
-
-        def ask(number: int, frame: FrameType | None) -> None:
-            if self._stop:
-                raise KeyboardInterrupt
-            self._stop = True
-            progress.console.print("stopping after this iteration and saving (Ctrl-C again stops at once)")
-
-        numbers = (signal.SIGINT, signal.SIGTERM)
-        try:
-            before = {number: signal.signal(number, ask) for number in numbers}
-        except ValueError:  # not in the main thread: the caller handles interrupts
-            before = {}
-        try:
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-
-
-def _random_state() -> dict[str, torch.Tensor]:
-    state = {"cpu": torch.get_rng_state()}
-    if torch.cuda.is_available():
-        state["cuda"] = torch.cuda.get_rng_state()
-    return state
-
-
-def _set_random_state(state: dict[str, torch.Tensor]) -> None:
-    torch.set_rng_state(state["cpu"])
-    if "cuda" in state and torch.cuda.is_available():
-        torch.cuda.set_rng_state(state["cuda"])
+    def describe_policy(self) -> dict[str, float]:
+        """Mean standard deviation of the actions."""
+        return {"action_std": self.alg.get_policy().output_std.mean().item()}

@@ -1,0 +1,255 @@
+"""The training loop of every learner: curves, checkpoints, an interrupt that saves."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import time
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import Any, Protocol, runtime_checkable
+
+import torch
+from torch.utils.tensorboard import SummaryWriter
+
+from vinl.config.errors import InputError
+from vinl.rl.progress import TrainingProgress
+from vinl.rl.run_folder import RunFolder
+
+Figures = Callable[[dict[str, float]], dict[str, str]]
+
+
+@runtime_checkable
+class TrainingEnv(Protocol):
+    """What the loop needs of an environment beside rsl-rl's ``VecEnv``."""
+
+    num_envs: int
+
+    def get_observations(self) -> Any:
+        """Of the present state."""
+        ...
+
+    def step(self, actions: torch.Tensor) -> tuple[Any, torch.Tensor, torch.Tensor, dict[str, Any]]:
+        """Observations, rewards, dones and extras."""
+        ...
+
+    def read_measures(self) -> dict[str, float]:
+        """Means since the last call."""
+        ...
+
+    def save_state(self) -> dict[str, Any]:
+        """Tensors and plain data that ``load_state`` takes back."""
+        ...
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Go on from a saved state."""
+        ...
+
+
+class Algorithm(Protocol):
+    """A learner with the names of rsl-rl's algorithms.
+
+    Attributes:
+        learning_rate: of the next update.
+    """
+
+    learning_rate: float
+
+    def act(self, obs: Any) -> torch.Tensor:
+        """Actions for the roll-out, without gradients."""
+        ...
+
+    def process_env_step(self, obs: Any, rewards: Any, dones: Any, extras: Any) -> None:
+        """Take note of what the actions led to."""
+        ...
+
+    def compute_returns(self, obs: Any) -> None:
+        """The roll-out is complete."""
+        ...
+
+    def update(self) -> dict[str, float]:
+        """Learn from the roll-out; losses by name."""
+        ...
+
+    def train_mode(self) -> None:
+        """Before the first roll-out."""
+        ...
+
+    def get_policy(self) -> Any:
+        """What is exported."""
+        ...
+
+    def save(self) -> dict[str, Any]:
+        """Tensors and plain data that ``load`` takes back."""
+        ...
+
+    def load(self, loaded_dict: dict[str, Any], load_cfg: dict | None, strict: bool) -> Any:
+        """Go on from what was saved."""
+        ...
+
+
+class TrainingLoop:
+    """Roll out, learn, write down, again; nothing waits for the device inside a roll-out.
+
+    Args:
+        env: the robots.
+        algorithm: the learner.
+        steps: control steps of each robot between updates.
+        folder: of the run.
+        device: torch device.
+        export: called after every checkpoint with the policy and the samples so far; writes the policy.
+        figures: picks what the progress bar shows from an iteration's measures.
+        schedule: called before every iteration with the algorithm and the share of iterations done, to move settings.
+        save_every: seconds between checkpoints.
+
+    Attributes:
+        current_learning_iteration: updates done.
+        samples: environment steps done.
+    """
+
+    def __init__(
+        self,
+        env: Any,
+        algorithm: Any,
+        steps: int,
+        folder: RunFolder,
+        device: str,
+        export: Callable[[Any, int], None],
+        figures: Figures,
+        schedule: Callable[[Any, float], None],
+        save_every: float = 60.0,
+    ) -> None:
+        self.env, self.alg, self.device, self.steps = env, algorithm, device, steps
+        self.folder, self.export, self.figures = folder, export, figures
+        self.schedule, self.save_every = schedule, save_every
+        self.current_learning_iteration, self.samples = 0, 0
+        self._stop = False
+
+    def describe_policy(self) -> dict[str, float]:
+        """Figures of the policy for the curves."""
+        return {}
+
+    def resume(self) -> bool:
+        """Take up the folder's checkpoint, if there is one.
+
+        Raises:
+            InputError: the checkpoint is broken or of another network.
+        """
+        checkpoint = self.folder.load_checkpoint()
+        if checkpoint is None:
+            self.folder.cut_metrics(-1)
+            return False
+        try:
+            self.alg.load(checkpoint["algorithm"], None, True)
+            self.env.load_state(checkpoint["environment"])
+            self.current_learning_iteration, self.samples = checkpoint["iteration"], checkpoint["samples"]
+            _set_random_state(checkpoint["random"])
+        except (KeyError, RuntimeError, ValueError) as error:
+            raise InputError(
+                f"{self.folder.path}: the checkpoint does not fit this run ({str(error).splitlines()[0]})"
+            ) from None
+        self.folder.cut_metrics(self.current_learning_iteration)
+        return True
+
+    def checkpoint(self) -> None:
+        """Write the checkpoint and the policy."""
+        self.folder.save_checkpoint(
+            {
+                "algorithm": self.alg.save(),
+                "environment": self.env.save_state(),
+                "iteration": self.current_learning_iteration,
+                "samples": self.samples,
+                "random": _random_state(),
+            }
+        )
+        self.export(self.alg.get_policy(), self.samples)
+
+    def train(self, iterations: int) -> bool:
+        """Go on until ``iterations`` are done in all, or an interrupt asks to stop; both save.
+
+        Returns:
+            Whether all iterations are done.
+        """
+        steps = self.steps
+        first = self.current_learning_iteration
+        writer = SummaryWriter(str(self.folder.path / "tensorboard"), purge_step=first)
+        observation = self.env.get_observations().to(self.device)
+        self.alg.train_mode()
+        saved = time.monotonic()
+        with TrainingProgress(iterations, first) as progress, self._interruptible(progress):
+            while self.current_learning_iteration < iterations and not self._stop:
+                start = time.perf_counter()
+                self.schedule(self.alg, self.current_learning_iteration / iterations)
+                observation = self._roll_out(observation)
+                collected = time.perf_counter()
+                losses = self.alg.update()
+                self.current_learning_iteration += 1
+                self.samples += steps * self.env.num_envs
+                measures = self.env.read_measures()
+                end = time.perf_counter()
+                row = {
+                    "iteration": self.current_learning_iteration,
+                    "samples": self.samples,
+                    "samples_per_second": steps * self.env.num_envs / (end - start),
+                    "update_seconds": end - collected,
+                    "seconds": end - start,
+                    "learning_rate": self.alg.learning_rate,
+                    **self.describe_policy(),
+                    **{f"loss/{name}": float(value) for name, value in losses.items()},
+                    **measures,
+                }
+                self.folder.append_metrics(
+                    {k: float(f"{v:.6g}") if isinstance(v, float) else v for k, v in row.items()}
+                )
+                for name, value in row.items():
+                    writer.add_scalar(name if "/" in name else f"train/{name}", value, self.current_learning_iteration)
+                progress.show(self.current_learning_iteration, self.figures(row))
+                if time.monotonic() - saved > self.save_every:
+                    self.checkpoint()
+                    saved = time.monotonic()
+            self.checkpoint()
+        writer.close()
+        return self.current_learning_iteration >= iterations
+
+    def _roll_out(self, observation: Any) -> Any:
+        with torch.inference_mode():
+            for _ in range(self.steps):
+                actions = self.alg.act(observation)
+                observation, rewards, dones, extras = self.env.step(actions)
+                self.alg.process_env_step(observation, rewards, dones, extras)
+            self.alg.compute_returns(observation)
+        return observation
+
+    @contextlib.contextmanager
+    def _interruptible(self, progress: TrainingProgress) -> Iterator[None]:
+        """The first Ctrl-C (or SIGTERM) ends the loop after the iteration; a second Ctrl-C ends it at once."""
+
+        def ask(number: int, frame: FrameType | None) -> None:
+            if self._stop:
+                raise KeyboardInterrupt
+            self._stop = True
+            progress.console.print("stopping after this iteration and saving (Ctrl-C again stops at once)")
+
+        numbers = (signal.SIGINT, signal.SIGTERM)
+        try:
+            before = {number: signal.signal(number, ask) for number in numbers}
+        except ValueError:  # not in the main thread: the caller handles interrupts
+            before = {}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+def _random_state() -> dict[str, torch.Tensor]:
+    state = {"cpu": torch.get_rng_state()}
+    if torch.cuda.is_available():
+        state["cuda"] = torch.cuda.get_rng_state()
+    return state
+
+
+def _set_random_state(state: dict[str, torch.Tensor]) -> None:
+    torch.set_rng_state(state["cpu"])
+    if "cuda" in state and torch.cuda.is_available():
+        torch.cuda.set_rng_state(state["cuda"])
