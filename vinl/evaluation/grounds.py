@@ -9,11 +9,15 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from vinl.config.errors import InputError
+from vinl.evaluation.ground_scan import GroundScan
 from vinl.evaluation.scene import build_scene
+from vinl.sensing.depth import Mesh
+from vinl.sensing.height_scan import scan_ground
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, HeightField, flat_field, raise_boxes
+from vinl.world.mesh import box_mesh, floor_mesh, heightfield_mesh, join_meshes
 from vinl.world.terrain import TILE, TerrainConfig, build_terrain, draw_blocks, scatter_centres
 
 TERRAINS = ("flat", "rough", "blocks")
@@ -25,6 +29,7 @@ UNSEEN = 7919
 """Added to the seed of the terrain, so that it is not the one of the training."""
 
 _RESOLUTION = 0.05
+_HORIZON = GridFrame(-1000.0, -1000.0, 10.0, (201, 201))
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,23 @@ class Ground:
     reach: float
     spread: float
     blocks: Blocks
+
+    def mesh(self) -> Mesh:
+        """What a camera sees: blocks as boxes on a plane, or the height field."""
+        if self.field.heights.any() and not len(self.blocks):
+            return heightfield_mesh(self.field.heights, self.field.frame)
+        return join_meshes(box_mesh(self.blocks.boxes()), floor_mesh(_HORIZON))
+
+
+class FieldScan(GroundScan):
+    """Reads the height scan of robots that all walk on one height field."""
+
+    def __init__(self, field: HeightField) -> None:
+        self._field = field
+
+    def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 187"]:
+        """Height of the ground [m] under the scan points of every robot."""
+        return scan_ground(np, self._field.heights, self._field.frame, qpos)
 
 
 def build_ground(config: GroundConfig) -> Ground:

@@ -13,10 +13,11 @@ import numpy as np
 from vinl.config.errors import InputError
 from vinl.evaluation.courses import CommandRanges, Course, choose_commands, command_ranges
 from vinl.evaluation.crew import Context, Crew
-from vinl.evaluation.evaluate import check_senses, describe_policy
+from vinl.evaluation.evaluate import describe_policy
 from vinl.evaluation.grounds import Ground, GroundConfig, build_ground
 from vinl.evaluation.herd import BoxHerd
 from vinl.evaluation.robot_records import RobotRecord, aggregate_robots
+from vinl.evaluation.senses import check_senses
 from vinl.evaluation.touches import BINS, bin_heights
 from vinl.evaluation.trial import run_trial
 from vinl.policies.policy import Policy

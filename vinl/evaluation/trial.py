@@ -8,15 +8,16 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from vinl.evaluation.courses import Course
-from vinl.evaluation.grounds import Ground
+from vinl.evaluation.eyes import Eyes
+from vinl.evaluation.grounds import FieldScan, Ground
 from vinl.evaluation.herd import Herd
 from vinl.evaluation.robot_records import FRONT, REAR, RobotRecord
+from vinl.evaluation.senses import Senses
 from vinl.evaluation.touches import BlockTouches
 from vinl.evaluation.walker import joint_targets
 from vinl.policies.policy import Policy
-from vinl.robot.observation import observe
+from vinl.robot.observation import PROPRIOCEPTION_SIZE
 from vinl.robot.rotation import rotate_inverse
-from vinl.sensing.height_scan import scan_ground
 
 SETTLED = 50
 """Control steps after a new command, or a new start, that the ``settled`` errors leave out."""
@@ -35,7 +36,7 @@ def run_trial(
 
     Args:
         herd: one robot for each course.
-        ground: what the height scan reads, and how far robots may go.
+        ground: what height scan and camera see, and how far robots may go.
         courses: starts and commands.
         policy: what drives them.
         is_stopped: asked once a second whether to give up.
@@ -47,6 +48,7 @@ def run_trial(
     records = [_new_record(ground, course) for course in courses]
     homes = np.array([ground.homes[course.home, :2] for course in courses])
     commands, fresh = np.stack([c.commands for c in courses], 1), np.stack([c.fresh for c in courses], 1)
+    senses = sense_ground(policy, ground, n)
     policy.reset(n)
     for k, course in enumerate(courses):
         herd.start(k, course.draw_start())
@@ -55,8 +57,7 @@ def run_trial(
         if step % SETTLED == 0 and is_stopped():
             break
         age[fresh[step]] = 0
-        scan = scan_ground(np, ground.field.heights, ground.field.frame, herd.qpos)
-        actions = policy.act(observe(np, herd.qpos, herd.qvel, commands[step], actions, scan))
+        actions = senses.act(herd.qpos, herd.qvel, commands[step], actions)
         before = herd.qpos[:, :2].copy()
         herd.step(joint_targets(actions, policy.card))
         metres = np.linalg.norm(herd.qpos[:, :2] - before, axis=1)
@@ -70,6 +71,13 @@ def run_trial(
         if away.any():
             policy.reset(away)
     return records
+
+
+def sense_ground(policy: Policy, ground: Ground, n: int) -> Senses:
+    """What a policy of n robots observes on a ground that all of them walk on."""
+    scan = FieldScan(ground.field) if policy.card.observation_size > PROPRIOCEPTION_SIZE else None
+    eyes = None if policy.camera is None else Eyes([ground.mesh()], [0] * n, policy.camera)
+    return Senses(policy, scan, eyes)
 
 
 def _new_record(ground: Ground, course: Course) -> RobotRecord:

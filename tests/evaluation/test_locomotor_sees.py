@@ -1,0 +1,49 @@
+"""Locomotors with a camera, or blind, on blocks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from vinl.evaluation.eyes import Eyes
+from vinl.evaluation.grounds import GroundConfig, build_ground
+from vinl.evaluation.locomotor import compare_locomotors
+from vinl.policies.card import PolicyCard
+from vinl.policies.depth_actor import DepthActor
+from vinl.policies.depth_policy import DepthPolicy
+from vinl.policies.policy import LocomotionPolicy
+from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP, home_qpos
+from vinl.robot.cameras import LOCOMOTION_CAMERA
+from vinl.robot.observation import describe
+from vinl.world.grid import GridFrame
+from vinl.world.heightfield import HeightField
+
+FRAME = GridFrame(-2.0, -2.0, 0.1, (41, 41))
+
+
+@pytest.mark.parametrize("vision", ["cnn", "none"])
+def test_students_walk_beside_others(vision: str, trotting: LocomotionPolicy) -> None:
+    torch.manual_seed(0)
+    network = DepthActor(vision=vision, hidden=8, layers=1, actor=(16,))
+    action = {"scale": ACTION_SCALE, "default_pose": DEFAULT_POSE.tolist(), "kp": KP, "kd": KD}
+    camera = LOCOMOTION_CAMERA.describe() if vision == "cnn" else None
+    student = DepthPolicy(
+        network, PolicyCard("locomotion", vision, network.describe(), describe()[:-1], action, camera)
+    )
+    results = compare_locomotors([student, trotting], "blocks", 2, 0.4)
+    assert [len(r.robots) for r in results] == [2, 2]
+    assert results[0].robots[0].steps == 20
+
+
+def test_camera_sees_the_blocks_that_the_feet_meet() -> None:
+    ground = build_ground(GroundConfig("blocks", 1.0, None, 0, 40.0, 2.0))
+    x, y = ground.blocks.rows[0, :2]
+    heading = 0.4
+    qpos = np.stack([home_qpos(x - 0.8 * np.cos(heading), y - 0.8 * np.sin(heading), yaw=heading)])
+    bare = build_ground(GroundConfig("blocks", 0.0, None, 0, 40.0, 2.0))
+    near, far = (Eyes([g.mesh()], [0], LOCOMOTION_CAMERA).look(qpos)[0].numpy() for g in (ground, bare))
+    assert (far - near)[:, 28:36].max() > 0.1 and (near <= far + 1e-5).all()
+    slope = HeightField(np.tile(np.linspace(0, 2, 41, dtype=np.float32), (41, 1)), np.zeros((41, 41), np.uint8), FRAME)
+    sloped = Eyes([replace(bare, field=slope).mesh()], [0], LOCOMOTION_CAMERA).look(np.stack([home_qpos(z=1.4)]))
+    assert sloped[0, 18, 32] < far[18, 32]
