@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-import shapely
 from jaxtyping import Float
 
 from vinl.world.blocks import Blocks
@@ -66,6 +66,8 @@ def scatter_blocks(
     wanted = round(preset.density * len(spots) * plan.frame.resolution**2)
     if wanted == 0:
         return Blocks.empty()
+    import shapely  # only here: training on generated homes does without
+
     boxes = plan.boxes
     low = boxes.rows[boxes.rows[:, 5] < BODY_HEIGHT] if len(boxes) else boxes.rows
     obstacles = shapely.STRtree(list(map(shapely.Polygon, Boxes(low).corners())))
@@ -93,8 +95,10 @@ def _draw(spots: np.ndarray, preset: ClutterPreset, rng: np.random.Generator, ce
     return np.column_stack([xy, yaw, length, np.full(n, preset.width), height])
 
 
-def _fit(rows: np.ndarray, plan: FloorPlan, obstacles: shapely.STRtree) -> np.ndarray:
+def _fit(rows: np.ndarray, plan: FloorPlan, obstacles: Any) -> np.ndarray:
     """The rows whose whole footprint is inside the building and touches no wall and no furniture."""
+    import shapely
+
     corners = Blocks(rows).boxes().corners()
     outline = np.concatenate([corners, (corners + np.roll(corners, 1, axis=1)) / 2], axis=1)
     cells = plan.frame.cell(outline)

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from skimage.measure import label
 
 from vinl.config.errors import InputError
 from vinl.world.floorplan import FloorPlan, measure_clearance
+from vinl.world.raster import label_regions
 
 FOOTPRINT_RADIUS = 0.22
 """Radius that the floor is eroded by [m]: AlienGo's agent radius in the paper's navigator
@@ -51,7 +51,7 @@ class FreeSpace:
             raise InputError(
                 f"{self.plan.source}: the plan is too small for the robot (radius {self.radius:.2f} m); check its scale"
             )
-        regions = np.asarray(label(traversable, connectivity=1), dtype=np.int32)
+        regions = label_regions(traversable)
         sizes = np.bincount(regions.ravel())
         sizes[0] = 0
         for name, value in (("clearance", clearance), ("traversable", traversable), ("regions", regions)):

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Bool, Int
-from skimage.measure import label
+from scipy.ndimage import label
 
 from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
+
+
+def label_regions(mask: Bool[np.ndarray, "rows columns"], corners: bool = False) -> Int[np.ndarray, "rows columns"]:
+    """Number of each cell's connected region, from 1 on in the order of their first cells; 0 off the mask.
+
+    Args:
+        mask: the cells that count.
+        corners: whether cells also join over corners, and not over edges only.
+    """
+    regions, _ = label(mask, np.ones((3, 3), bool) if corners else None)  # type: ignore[misc]
+    return regions
 
 
 def split_rectangles(mask: Bool[np.ndarray, "rows columns"], limit: int = 20_000) -> Int[np.ndarray, "n 4"]:
@@ -59,7 +70,7 @@ def drop_specks(mask: Bool[np.ndarray, "rows columns"], min_speck: int) -> Bool[
     """The mask without its pieces (joined over edges and corners) of fewer than ``min_speck`` cells."""
     if min_speck <= 1:
         return mask
-    pieces = np.asarray(label(mask, connectivity=2))
+    pieces = label_regions(mask, corners=True)
     sizes = np.bincount(pieces.ravel())
     sizes[0] = 0
     return (sizes >= min_speck)[pieces]
@@ -71,19 +82,27 @@ def paint_boxes(boxes: Boxes, frame: GridFrame) -> Bool[np.ndarray, "rows column
     grid = np.zeros(frame.shape, dtype=bool)
     if not len(boxes):
         return grid
-    turned = np.abs(np.sin(2 * boxes.rows[:, 2])) > 1e-6
-    least = frame.resolution * np.where(turned, np.sqrt(2), 1.0)
     rows = boxes.rows.copy()
+    turned = np.abs(np.sin(2 * rows[:, 2])) > 1e-6
+    least = frame.resolution * np.where(turned, np.sqrt(2), 1.0)
     rows[:, 3], rows[:, 4] = np.maximum(rows[:, 3], least), np.maximum(rows[:, 4], least)
-    corners = Boxes(rows).corners()
+    # a straight box is a range of rows and columns; one turned by a quarter has its sides swapped
+    quarter = np.abs(np.cos(rows[:, 2])) < 0.5
+    reach = np.where(quarter[:, None], rows[:, [4, 3]], rows[:, [3, 4]]) / 2
+    reach[turned] = (np.abs(Boxes(rows[turned]).corners() - rows[turned, None, :2])).max(1)
     x, y = frame.centres()
-    for row, corner in zip(rows, corners, strict=True):
-        c0, c1 = np.searchsorted(x, [corner[:, 0].min() - 1e-9, corner[:, 0].max() + 1e-9])
-        r0, r1 = np.searchsorted(y, [corner[:, 1].min() - 1e-9, corner[:, 1].max() + 1e-9])
-        if c0 >= c1 or r0 >= r1:
-            continue
-        dx, dy = x[None, c0:c1] - row[0], y[r0:r1, None] - row[1]
-        c, s = np.cos(row[2]), np.sin(row[2])
-        held = (np.abs(c * dx + s * dy) <= row[3] / 2 + 1e-9) & (np.abs(c * dy - s * dx) <= row[4] / 2 + 1e-9)
-        grid[r0:r1, c0:c1] |= held
+    first = np.column_stack(
+        [np.searchsorted(line, rows[:, k] - reach[:, k] - 1e-9) for k, line in ((0, x), (1, y))]
+    ).tolist()
+    last = np.column_stack(
+        [np.searchsorted(line, rows[:, k] + reach[:, k] + 1e-9, side="right") for k, line in ((0, x), (1, y))]
+    ).tolist()
+    for row, askew, (c0, r0), (c1, r1) in zip(rows, turned.tolist(), first, last, strict=True):
+        if not askew:
+            grid[r0:r1, c0:c1] = True
+        elif c0 < c1 and r0 < r1:
+            dx, dy = x[None, c0:c1] - row[0], y[r0:r1, None] - row[1]
+            c, s = np.cos(row[2]), np.sin(row[2])
+            held = (np.abs(c * dx + s * dy) <= row[3] / 2 + 1e-9) & (np.abs(c * dy - s * dx) <= row[4] / 2 + 1e-9)
+            grid[r0:r1, c0:c1] |= held
     return grid

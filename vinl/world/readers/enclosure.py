@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool
 from scipy.ndimage import distance_transform_edt
-from skimage.measure import label
+
+from vinl.world.raster import label_regions
 
 GAPS = (1.3, 2.2)
 """Openings in the outer walls up to these widths [m] do not let the outside in: a front door, then a double one. The
@@ -33,7 +34,7 @@ def find_inside(walls: Bool[np.ndarray, "rows columns"], resolution: float) -> B
     inside, _ = _enclose(walls, away, GAPS[0] / 2, resolution)
     for gap in GAPS[1:]:
         wider, cores = _enclose(walls, away, gap / 2, resolution)
-        rooms = np.asarray(label(wider & ~inside, connectivity=1))
+        rooms = label_regions(wider & ~inside)
         kept = np.unique(rooms[cores & (rooms > 0)])
         inside |= np.isin(rooms, kept[kept > 0])
     cut = int(GAPS[-1] / resolution) + 2
@@ -43,13 +44,13 @@ def find_inside(walls: Bool[np.ndarray, "rows columns"], resolution: float) -> B
 def _enclose(walls: np.ndarray, away: np.ndarray, radius: float, resolution: float) -> tuple[np.ndarray, np.ndarray]:
     """What a disc of this radius that comes from outside cannot cover, and where within it the disc itself fits."""
     fits = away > radius
-    places = np.asarray(label(fits, connectivity=1))
+    places = label_regions(fits)
     outer = fits & (places == places[0, 0])
     reach = np.asarray(distance_transform_edt(~outer)) * resolution
     outside = reach <= radius
     cores = fits & ~outer
     inside = ~walls & ~outside
-    rooms = np.asarray(label(inside, connectivity=1))
+    rooms = label_regions(inside)
     area = np.bincount(rooms.ravel()) * resolution**2
     touches = np.zeros(len(area), dtype=bool)
     # rooms that touch the outside and neither hold the disc nor much floor are corners of the outside

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-import shapely
 from jaxtyping import Bool, Float
-from shapely.ops import polylabel
 
 from vinl.config.errors import InputError
 from vinl.world.floorplan import frame_around
@@ -17,6 +15,8 @@ from vinl.world.readers.segments import Wall
 
 def paint_polygon(polygon: Float[np.ndarray, "k 2"], frame: GridFrame) -> Bool[np.ndarray, "rows columns"]:
     """The cells whose centre lies in the outline [m]."""
+    import shapely  # only here: generated homes do without
+
     x, y = frame.centres()
     shape = shapely.make_valid(shapely.Polygon(polygon))
     shapely.prepare(shape)
@@ -25,6 +25,9 @@ def paint_polygon(polygon: Float[np.ndarray, "k 2"], frame: GridFrame) -> Bool[n
 
 def place_label(polygon: Float[np.ndarray, "k 2"]) -> tuple[float, float]:
     """A point well inside the outline [m]: the middle of the largest circle in it."""
+    import shapely
+    from shapely.ops import polylabel
+
     shape = shapely.Polygon(polygon)
     point = polylabel(shape, 0.1) if shape.is_valid and shape.area > 0 else shape.centroid
     return float(point.x), float(point.y)

@@ -1,0 +1,79 @@
+"""What made-up homes are like."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from vinl.config.errors import InputError
+
+RANGES = {
+    "area": (30.0, 400.0),
+    "door_width": (0.75, 2.0),
+    "door_height": (1.8, 3.0),
+    "wall_height": (2.0, 6.0),
+    "inner_wall": (0.05, 0.3),
+    "outer_wall": (0.05, 0.6),
+    "corridor_width": (1.0, 3.0),
+    "furniture_density": (0.0, 2.0),
+}
+"""What each range of ``HomeConfig`` may lie in."""
+
+
+@dataclass(frozen=True)
+class HomeConfig:
+    """Ranges and shares that homes are drawn from. Every range is (least, most), both included.
+
+    Attributes:
+        area: floor between the middle lines of the outer walls [m2]; small homes are drawn more often than large ones.
+        door_width: clear width of doors [m].
+        door_height: height of doors, below the lintel [m].
+        wall_height: height of all walls of a home [m].
+        inner_wall: thickness of the walls between rooms, one for all of a home [m].
+        outer_wall: thickness of the walls to the outside, at least that of the inner ones [m].
+        corridor_width: width of a corridor between the middle lines of its walls [m].
+        corridor_share: share of homes whose rooms lie along a corridor; the others are split into rooms at random.
+        l_shape_share: share of homes of two wings.
+        open_plan_share: share of homes whose living room and kitchen, at times also the corridor, are one.
+        loft_share: share of homes that are one large room, with few small ones cut off.
+        passage_share: share of the doors to living rooms, kitchens and corridors that are open passages of 1.3 m to
+            2.4 m.
+        loop_share: probability of a second door where two of those rooms touch that are connected already.
+        furniture_density: how full rooms are; 0 is bare, 1 as lived in, above 1 crowded.
+        bare_share: share of homes without furniture, walls only.
+        askew_share: probability that a piece of furniture stands turned or in the way instead of at its wall.
+    """
+
+    area: tuple[float, float] = (40.0, 250.0)
+    door_width: tuple[float, float] = (0.75, 1.2)
+    door_height: tuple[float, float] = (1.95, 2.2)
+    wall_height: tuple[float, float] = (2.3, 3.4)
+    inner_wall: tuple[float, float] = (0.08, 0.2)
+    outer_wall: tuple[float, float] = (0.15, 0.3)
+    corridor_width: tuple[float, float] = (1.1, 1.9)
+    corridor_share: float = 0.45
+    l_shape_share: float = 0.35
+    open_plan_share: float = 0.35
+    loft_share: float = 0.12
+    passage_share: float = 0.3
+    loop_share: float = 0.3
+    furniture_density: tuple[float, float] = (0.3, 1.3)
+    bare_share: float = 0.06
+    askew_share: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name, (least, most) in RANGES.items():
+            low, high = getattr(self, name)
+            if not (math.isfinite(low) and math.isfinite(high) and least <= low <= high <= most):
+                raise InputError(
+                    f"homes: {name} must be a rising range between {least:g} and {most:g}, got ({low:g}, {high:g})"
+                )
+        for name in vars(self):
+            if name.endswith("_share") and not 0.0 <= getattr(self, name) <= 1.0:
+                raise InputError(f"homes: {name} must lie between 0 and 1, got {getattr(self, name):g}")
+        if self.area[1] < 1.05 * self.area[0]:
+            raise InputError(f"homes: area needs some room between least and most, got {self.area}")
+        if self.door_height[1] > self.wall_height[0]:
+            raise InputError("homes: the highest door must not be higher than the lowest wall")
+        if self.corridor_width[0] - max(self.inner_wall[1], self.outer_wall[1]) < self.door_width[0]:
+            raise InputError("homes: a corridor less its walls must be at least as wide as the narrowest door")

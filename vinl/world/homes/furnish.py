@@ -1,0 +1,312 @@
+"""Furniture in its place: against walls, off doors, not through one another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from random import Random
+
+from vinl.world.homes import catalogue as make
+from vinl.world.homes.catalogue import Part
+from vinl.world.homes.config import HomeConfig
+from vinl.world.homes.rooms import Rect, Room
+from vinl.world.homes.walls import Row, Shell
+
+TRIES = 6
+"""Places tried for a piece before it is left out."""
+
+Maker = Callable[[Random], list[Part]]
+
+
+@dataclass
+class Piece:
+    """A piece of furniture, or a group that belongs together (a table and its chairs), in its place.
+
+    Attributes:
+        room: number of its room.
+        rows: its boxes.
+    """
+
+    room: int
+    rows: list[Row]
+
+
+@dataclass
+class Face:
+    """A stretch of wall seen from a room: where it lies, and which way the room is.
+
+    ``upright`` walls run along y; ``side`` is +1 where the room lies at larger coordinates.
+    """
+
+    upright: bool
+    at: float
+    low: float
+    high: float
+    side: int
+
+
+@dataclass
+class Floor:
+    """A room while it is furnished: the rectangles between its walls, its wall faces, and what is taken."""
+
+    rects: list[Rect]
+    faces: list[Face]
+    taken: list[Rect]
+    wall_taken: list[Rect] = field(default_factory=list)
+
+
+def furnish(rng: Random, shell: Shell, config: HomeConfig) -> list[Piece]:
+    """Furniture for all rooms of a home, as full as the home's density says."""
+    bare = rng.random() < config.bare_share
+    density = rng.uniform(*config.furniture_density)
+    if bare or density == 0.0:
+        return []
+    pieces: list[Piece] = []
+    for k, room in enumerate(shell.rooms):
+        floor = _find_floor(shell, k)
+        local = density * rng.uniform(0.6, 1.3)
+        for maker, wish, where in _wish(rng, room):
+            # each wish is fulfilled by chance; above a density of 1 some are fulfilled twice
+            count = int(local * wish) + (rng.random() < (local * wish) % 1.0) if wish < 1.0 else 1
+            if wish >= 1.0 and local < 0.5 and rng.random() > 0.4 + local:
+                continue
+            for _ in range(count):
+                rows = _place(rng, floor, maker, where, config.askew_share)
+                if rows:
+                    pieces.append(Piece(k, rows))
+    return pieces
+
+
+def _find_floor(shell: Shell, room: int) -> Floor:
+    """The room between its walls, and the stretches of wall that furniture may stand at."""
+    faces: list[Face] = []
+    keep = shell.outer / 2
+    rects = []
+    for x0, y0, x1, y1 in shell.rooms[room].rects:
+        sides = [x0, y0, x1, y1]
+        for edge in shell.edges:
+            if room not in edge.rooms:
+                continue
+            half = (shell.outer if min(edge.rooms) < 0 else shell.inner) / 2
+            if edge.upright:
+                if edge.at == x0 and edge.rooms[1] == room and edge.low < y1 and edge.high > y0:
+                    sides[0] = max(sides[0], x0 + half)
+                if edge.at == x1 and edge.rooms[0] == room and edge.low < y1 and edge.high > y0:
+                    sides[2] = min(sides[2], x1 - half)
+            else:
+                if edge.at == y0 and edge.rooms[1] == room and edge.low < x1 and edge.high > x0:
+                    sides[1] = max(sides[1], y0 + half)
+                if edge.at == y1 and edge.rooms[0] == room and edge.low < x1 and edge.high > x0:
+                    sides[3] = min(sides[3], y1 - half)
+        rects.append((sides[0], sides[1], sides[2], sides[3]))
+    for edge in shell.edges:
+        if room not in edge.rooms:
+            continue
+        half = (shell.outer if min(edge.rooms) < 0 else shell.inner) / 2
+        side = 1 if edge.rooms[1] == room else -1
+        start = edge.low + keep
+        for low, high, _ in [*sorted(edge.gaps), (edge.high - keep, 0.0, 0.0)]:
+            if low - start > 0.3:
+                faces.append(Face(edge.upright, edge.at + side * half, start, low, side))
+            start = high
+    return Floor(rects, faces, list(shell.clear[room]))
+
+
+def _wish(rng: Random, room: Room) -> list[tuple[Maker, float, str]]:
+    """What belongs into a room: how it is made, how likely it is at density 1, and where it stands."""
+    area = room.area
+    kind = room.kind
+    long = lambda least, most: rng.uniform(least, most)  # noqa: E731
+    wishes: list[tuple[Maker, float, str]] = []
+    if kind == "bedroom":
+        wishes = [
+            (lambda r: make.bed(r, area > 8.5), 1.0, "middle" if area > 10 else "wall"),
+            (make.wardrobe, 0.95, "corner"),
+            (make.desk, 0.35, "wall"),
+            (make.chest, 0.5, "wall"),
+            (make.shelf, 0.3, "wall"),
+            (make.armchair, 0.15, "corner"),
+        ]
+    elif kind == "child":
+        wishes = [
+            (lambda r: make.bed(r, False), 1.0, "corner"),
+            (make.desk, 0.8, "wall"),
+            (make.wardrobe, 0.6, "corner"),
+            (make.shelf, 0.7, "wall"),
+            (lambda r: make.bed(r, False), 0.3, "corner"),
+            (make.stand, 0.6, "floor"),
+        ]
+    elif kind in ("living", "studio"):
+        wishes = [(make.sofa_group, 1.0, "free" if area > 28 and rng.random() < 0.4 else "middle")]
+        if kind == "studio" or (area > 30 and rng.random() < 0.3):
+            width = long(2.0, 3.6)
+            wishes.append((lambda r: make.counter(r, width), 1.0, "corner"))
+            if area > 32:
+                wishes.append((make.island, 0.5, "floor"))
+        if kind == "studio" or area > 20:
+            wishes.append(
+                (lambda r: make.table_with_chairs(r, r.uniform(1.2, 2.0), r.uniform(0.75, 1.0)), 0.85, "floor")
+            )
+        wishes += [
+            (make.television, 0.8, "middle"),
+            (make.shelf, 0.8, "wall"),
+            (make.armchair, 0.6, "corner"),
+            (make.side_table, 0.3, "corner"),
+            (make.chest, 0.4, "wall"),
+        ]
+        for _ in range(int(area / 18)):
+            wishes += [(make.shelf, 0.4, "wall"), (make.armchair, 0.4, "floor"), (make.stand, 0.5, "floor")]
+        if area > 45:
+            wishes += [(make.sofa_group, 0.6, "free"), (make.desk, 0.5, "wall"), (make.chest, 0.5, "wall")]
+    elif kind == "kitchen":
+        width, second = long(1.8, 3.6), long(1.2, 2.4)
+        wishes = [
+            (lambda r: make.counter(r, width), 1.0, "corner"),
+            (lambda r: make.counter(r, second), 0.6, "corner"),
+            (
+                lambda r: make.table_with_chairs(r, r.uniform(0.8, 1.4), r.uniform(0.7, 0.85)),
+                0.8 if area > 9 else 0.3,
+                "floor",
+            ),
+            (make.shelf, 0.2, "wall"),
+        ]
+        if area > 18:
+            wishes.insert(2, (make.island, 0.5, "floor"))
+    elif kind == "dining":
+        wishes = [
+            (lambda r: make.table_with_chairs(r, r.uniform(1.4, 2.4), r.uniform(0.8, 1.05)), 1.0, "floor"),
+            (make.chest, 0.8, "wall"),
+            (make.shelf, 0.4, "wall"),
+        ]
+    elif kind == "bath":
+        wet = make.bath if area > 4.0 and rng.random() < 0.6 else make.shower
+        wishes = [
+            (wet, 1.0, "corner"),
+            (make.toilet, 0.95, "wall"),
+            (make.basin, 0.95, "wall"),
+            (make.washer, 0.4, "corner"),
+        ]
+    elif kind == "wc":
+        wishes = [(make.toilet, 1.0, "wall"), (make.basin, 0.8, "wall")]
+    elif kind == "store":
+        wishes = [
+            (make.shelf, 0.9, "wall"),
+            (make.shelf, 0.7, "wall"),
+            (make.washer, 0.4, "corner"),
+            (make.stand, 0.7, "floor"),
+        ]
+    elif kind == "office":
+        wishes = [
+            (make.desk, 1.0, "wall"),
+            (make.shelf, 0.9, "wall"),
+            (make.shelf, 0.7, "wall"),
+            (make.armchair, 0.4, "corner"),
+        ]
+    elif kind == "hall":
+        wishes = [
+            (make.shoe_rack, 0.7, "wall"),
+            (make.shoe_rack, 0.3, "wall"),
+            (make.chest, 0.2 if area > 9 else 0.0, "wall"),
+        ]
+    if kind not in ("wc", "bath"):
+        wishes += [(make.stand, 0.5, "corner")] + [(make.stand, 0.3, "floor")] * int(area / 12)
+    return wishes
+
+
+def _place(rng: Random, floor: Floor, maker: Maker, where: str, askew: float) -> list[Row]:
+    """Try places until the piece stands on free floor; nothing if there is none."""
+    parts = maker(rng)
+    u0 = min(u - (abs(math.cos(t)) * a + abs(math.sin(t)) * b) / 2 for u, _, t, a, b, _, _ in parts)
+    u1 = max(u + (abs(math.cos(t)) * a + abs(math.sin(t)) * b) / 2 for u, _, t, a, b, _, _ in parts)
+    v0 = min(v - (abs(math.sin(t)) * a + abs(math.cos(t)) * b) / 2 for _, v, t, a, b, _, _ in parts)
+    v1 = max(v + (abs(math.sin(t)) * a + abs(math.cos(t)) * b) / 2 for _, v, t, a, b, _, _ in parts)
+    # from here on the piece stands on the middle of its bounding rectangle
+    parts = make.move(parts, -(u0 + u1) / 2, -(v0 + v1) / 2)
+    depth, width = u1 - u0, v1 - v0
+    out_of_place = rng.random() < askew
+    if out_of_place and where != "floor" and depth * width < 1.6:
+        where = "floor"
+    for _ in range(TRIES):
+        spot = _find_spot(rng, floor, depth, width, where)
+        if spot is None:
+            continue
+        x, y, facing = spot
+        turn = 0.0
+        if where == "floor" and (out_of_place or rng.random() < 0.15):
+            turn = rng.uniform(-math.pi, math.pi)
+        elif where in ("floor", "free") and rng.random() < 0.4:
+            turn = rng.gauss(0.0, 0.08)
+        rect = _reach(x, y, facing, depth, width, turn)
+        if not _fits(rect, floor, 0.04 if where in ("wall", "corner", "middle") else 0.1):
+            continue
+        floor.taken.append(rect)
+        return _stand(parts, x, y, facing, turn)
+    return []
+
+
+def _find_spot(rng: Random, floor: Floor, depth: float, width: float, where: str) -> tuple[float, float, int] | None:
+    """Middle of the piece [m] and the quarter it faces (0: +x, 1: +y, 2: -x, 3: -y)."""
+    if where == "floor":
+        x0, y0, x1, y1 = floor.rects[rng.randrange(len(floor.rects))]
+        facing = rng.randrange(4)
+        a, b = (depth, width) if facing % 2 == 0 else (width, depth)
+        if x1 - x0 < a + 0.1 or y1 - y0 < b + 0.1:
+            return None
+        return rng.uniform(x0 + a / 2, x1 - a / 2), rng.uniform(y0 + b / 2, y1 - b / 2), facing
+    if not floor.faces:
+        return None
+    face = floor.faces[rng.randrange(len(floor.faces))]
+    spare = face.high - face.low - width
+    if spare < 0.02:
+        return None
+    if where == "corner":
+        along = 0.01 if rng.random() < 0.5 else spare - 0.01
+    elif where == "middle" and rng.random() < 0.7:
+        along = spare * rng.uniform(0.4, 0.6)
+    else:
+        along = rng.uniform(0.01, spare - 0.01)
+    along += face.low + width / 2
+    off = rng.uniform(0.8, 1.8) if where == "free" else 0.01 if rng.random() < 0.7 else rng.uniform(0.01, 0.06)
+    across = face.at + face.side * (depth / 2 + off)
+    if face.upright:
+        return across, along, 0 if face.side > 0 else 2
+    return along, across, 1 if face.side > 0 else 3
+
+
+def _reach(x: float, y: float, facing: int, depth: float, width: float, turn: float) -> Rect:
+    """The upright rectangle around the piece."""
+    a, b = (depth, width) if facing % 2 == 0 else (width, depth)
+    if turn:
+        c, s = abs(math.cos(turn)), abs(math.sin(turn))
+        a, b = c * a + s * b, s * a + c * b
+    return (x - a / 2, y - b / 2, x + a / 2, y + b / 2)
+
+
+def _fits(rect: Rect, floor: Floor, gap: float) -> bool:
+    """Whether a piece is inside the room and off everything else."""
+    x0, y0, x1, y1 = rect
+    for a, b, c, d in floor.taken:
+        if x0 < c + gap and x1 > a - gap and y0 < d + gap and y1 > b - gap:
+            return False
+    return any(x0 >= a and y0 >= b and x1 <= c and y1 <= d for a, b, c, d in floor.rects)
+
+
+def _stand(parts: list[Part], x: float, y: float, facing: int, turn: float) -> list[Row]:
+    """Parts to boxes in the world; those at right angles get sides along x and y and no turn."""
+    angle = facing * math.pi / 2 + turn
+    c, s = (1, 0, -1, 0)[facing], (0, 1, 0, -1)[facing]
+    if turn:
+        c, s = math.cos(angle), math.sin(angle)
+    rows: list[Row] = []
+    for u, v, own, length, width, bottom, top in parts:
+        yaw = own + angle
+        quarter = round(yaw / (math.pi / 2))
+        if abs(yaw - quarter * math.pi / 2) < 1e-6:
+            yaw = 0.0
+            if quarter % 2:
+                length, width = width, length
+        at = round(x + c * u - s * v, 4), round(y + s * u + c * v, 4)
+        sizes = round(yaw, 4), round(length, 4), round(width, 4), round(bottom, 4), round(top, 4)
+        rows.append((*at, *sizes))
+    return rows

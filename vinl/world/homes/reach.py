@@ -1,0 +1,127 @@
+"""Furniture that cuts the floor in two is taken away, until the robot reaches every room."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool
+from scipy.ndimage import find_objects
+
+from vinl.world.boxes import Boxes
+from vinl.world.floorplan import BODY_HEIGHT, measure_clearance
+from vinl.world.free_space import FIT_RADIUS
+from vinl.world.grid import GridFrame
+from vinl.world.homes.furnish import Piece
+from vinl.world.homes.rooms import Rect, Room
+from vinl.world.raster import label_regions, paint_boxes
+
+CHECKED_AT = 0.1
+"""Side of the cells that ways are checked on [m]. A way that is wide enough on these is wide enough on finer ones."""
+
+POCKET = 0.25
+"""Floor cut off from the rest that is let be [m2]: the spot behind an open bedside."""
+
+ROUNDS = 12
+
+
+def keep_connected(
+    rooms: list[Room], walls: Boxes, pieces: list[Piece], inside: Bool[np.ndarray, "rows columns"], frame: GridFrame
+) -> list[Piece] | None:
+    """The pieces that may stay, so that a robot of ``FIT_RADIUS`` reaches every room and all floor but pockets.
+
+    Args:
+        rooms: of the home.
+        walls: lintels included.
+        pieces: all furniture.
+        inside: floor of the home on the frame.
+        frame: of ``CHECKED_AT``.
+
+    Returns:
+        ``None`` if the rooms are not connected even without furniture.
+    """
+    floor = inside & ~paint_boxes(Boxes(walls.rows[walls.rows[:, 5] < BODY_HEIGHT]), frame)
+    masks = [_paint_low(piece, frame) for piece in pieces]
+    windows = [_window(rect, frame) for room in rooms for rect in room.rects]
+    owners = [k for k, room in enumerate(rooms) for _ in room.rects]
+    kept = set(range(len(pieces)))
+    for attempt in range(ROUNDS + 1):
+        free = floor.copy()
+        for k in kept:
+            where, mask = masks[k]
+            free[where] &= ~mask
+        fits = measure_clearance(free, frame.resolution) >= FIT_RADIUS
+        regions = label_regions(fits)
+        if not regions.any():
+            return None
+        sizes = np.bincount(regions.ravel())
+        sizes[0] = 0
+        main = int(sizes.argmax())
+        gone: set[int] = set()
+        for number, where in enumerate(find_objects(regions), start=1):
+            if number != main and sizes[number] * frame.resolution**2 >= POCKET:
+                gone |= _blame(where, masks, kept)
+        reached = {owner for owner, where in zip(owners, windows, strict=True) if (regions[where] == main).any()}
+        lost = set(range(len(rooms))) - reached
+        for room in lost:
+            inner = [k for k in kept if pieces[k].room == room]
+            gone |= set(inner) if attempt >= ROUNDS // 2 else set(inner[-1:])
+        if not gone:
+            return None if lost else [pieces[k] for k in sorted(kept)]
+        kept -= gone
+    return [] if _joined(floor, frame, windows, owners) else None
+
+
+def paint_rects(rects: list[Rect], frame: GridFrame) -> Bool[np.ndarray, "rows columns"]:
+    """The cells whose centre lies in one of the rectangles."""
+    grid = np.zeros(frame.shape, dtype=bool)
+    for rect in rects:
+        grid[_window(rect, frame)] = True
+    return grid
+
+
+def _window(rect: Rect, frame: GridFrame) -> tuple[slice, slice]:
+    """The cells whose centre lies in a rectangle."""
+    x0, y0, x1, y1 = rect
+    low = np.ceil((np.array([y0, x0]) - [frame.y0, frame.x0]) / frame.resolution - 1e-9).astype(int)
+    high = np.floor((np.array([y1, x1]) - [frame.y0, frame.x0]) / frame.resolution + 1e-9).astype(int) + 1
+    return slice(max(low[0], 0), max(high[0], 0)), slice(max(low[1], 0), max(high[1], 0))
+
+
+def _paint_low(piece: Piece, frame: GridFrame) -> tuple[tuple[slice, slice], np.ndarray]:
+    """The cells under those parts of a piece that take floor from the robot, and the part of the grid they lie in."""
+    rows = np.array([row for row in piece.rows if row[5] < BODY_HEIGHT]).reshape(-1, 7)
+    if not len(rows):
+        return (slice(0, 0), slice(0, 0)), np.zeros((0, 0), bool)
+    reach = np.hypot(rows[:, 3], rows[:, 4]) / 2 + 2 * frame.resolution
+    low, high = (rows[:, :2] - reach[:, None]).min(0), (rows[:, :2] + reach[:, None]).max(0)
+    where = _window((low[0], low[1], high[0], high[1]), frame)
+    part = GridFrame(
+        frame.x0 + where[1].start * frame.resolution,
+        frame.y0 + where[0].start * frame.resolution,
+        frame.resolution,
+        (min(where[0].stop, frame.shape[0]) - where[0].start, min(where[1].stop, frame.shape[1]) - where[1].start),
+    )
+    return where, paint_boxes(Boxes(rows), part)
+
+
+def _blame(where: tuple[slice, slice], masks: list, kept: set[int]) -> set[int]:
+    """Of the pieces around a cut-off region, the one that covers most of its surroundings."""
+    reach = 5
+    r0, r1, c0, c1 = where[0].start - reach, where[0].stop + reach, where[1].start - reach, where[1].stop + reach
+    best, worst = 0, set()
+    for k in sorted(kept):
+        (rows, columns), mask = masks[k]
+        part = mask[
+            max(r0 - rows.start, 0) : max(r1 - rows.start, 0), max(c0 - columns.start, 0) : max(c1 - columns.start, 0)
+        ]
+        count = int(part.sum())
+        if count > best:
+            best, worst = count, {k}
+    return worst
+
+
+def _joined(floor: np.ndarray, frame: GridFrame, windows: list[tuple[slice, slice]], owners: list[int]) -> bool:
+    regions = label_regions(measure_clearance(floor, frame.resolution) >= FIT_RADIUS)
+    if not regions.any():
+        return False
+    main = int(np.bincount(regions.ravel())[1:].argmax()) + 1
+    return {o for o, where in zip(owners, windows, strict=True) if (regions[where] == main).any()} == set(owners)

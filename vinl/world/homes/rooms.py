@@ -1,0 +1,249 @@
+"""Which rooms a home has and where they lie: a footprint, cut into rectangles, each given a use."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from random import Random
+
+from vinl.world.homes.config import HomeConfig
+
+Rect = tuple[float, float, float, float]
+"""x0, y0, x1, y1 on the middle lines of the walls [m]."""
+
+NARROWEST = 1.7
+"""Least side of a room between the middle lines of its walls [m]: a bath."""
+
+LEAST_SIDE = 2.5
+"""Least side of what is not a bath or a store [m]."""
+
+WING = 3.2
+"""Least side of a wing [m]."""
+
+
+@dataclass
+class Room:
+    """A room: what it is for and the rectangles that it consists of, with no walls between these."""
+
+    kind: str
+    rects: list[Rect]
+
+    @property
+    def area(self) -> float:
+        """Floor [m2], walls counted to their middle lines."""
+        return sum(measure(rect) for rect in self.rects)
+
+
+def measure(rect: Rect) -> float:
+    """Area of a rectangle [m2]."""
+    return (rect[2] - rect[0]) * (rect[3] - rect[1])
+
+
+def draw_rooms(rng: Random, config: HomeConfig) -> list[Room]:
+    """Draw a footprint and cut it into rooms; all in one corner of the world, from (0, 0) on."""
+    low, high = config.area
+    area = math.exp(rng.uniform(math.log(low), math.log(high * 0.98)))
+    wings = _draw_wings(rng, area, config)
+    rects: list[Rect] = []
+    halls: list[Rect] = []
+    loft = rng.random() < config.loft_share
+    for wing in wings:
+        if loft:
+            _cut_loft(wing, rng, rects)
+        elif rng.random() >= config.corridor_share or not _cut_along_corridor(wing, rng, config, rects, halls):
+            _split(wing, rng, rng.uniform(8.0, 24.0), rects)
+    rects = _drop_corner(rng, rects, halls, low)
+    rooms = _name_rooms(rng, rects, halls)
+    if rng.random() < config.open_plan_share:
+        rooms = _open_plan(rng, rooms)
+    return _turn(rng, rooms)
+
+
+def _draw_wings(rng: Random, area: float, config: HomeConfig) -> list[Rect]:
+    """One rectangle, or the two of an L."""
+    aspect = math.exp(rng.uniform(0.0, math.log(2.1)))
+    if rng.random() < config.l_shape_share:
+        cut_x, cut_y = rng.uniform(0.25, 0.6), rng.uniform(0.3, 0.6)
+        width = math.sqrt(area * aspect / (1 - cut_x * cut_y))
+        height = width / aspect
+        w, h, x, y = (round(v, 2) for v in (width, height, (1 - cut_x) * width, (1 - cut_y) * height))
+        if min(x, y, h - y) >= WING:
+            return [(0.0, 0.0, w, y), (0.0, y, x, h)]
+    width = round(math.sqrt(area * aspect), 2)
+    return [(0.0, 0.0, width, round(area / width, 2))]
+
+
+def _split(rect: Rect, rng: Random, target: float, out: list[Rect]) -> None:
+    """Halve until the rooms are no larger than the target [m2], which is drawn anew on the way down."""
+    x0, y0, x1, y1 = rect
+    w, h = x1 - x0, y1 - y0
+    long, short = max(w, h), min(w, h)
+    if (w * h <= target and long < 2.4 * short) or long < 2 * NARROWEST + 0.3:
+        out.append(rect)
+        return
+    least = NARROWEST if long < 2 * LEAST_SIDE + 0.2 else LEAST_SIDE
+    at = min(max(rng.uniform(0.3, 0.7) * long, least), long - least)
+    for part in _halve(rect, at, w >= h if rng.random() < 0.85 or short < 2 * LEAST_SIDE else w < h):
+        _split(part, rng, rng.uniform(7.0, 22.0) if rng.random() < 0.7 else target, out)
+
+
+def _halve(rect: Rect, at: float, across_x: bool) -> tuple[Rect, Rect]:
+    """Two parts, the first ``at`` metres long along x or y, held so that both keep the narrowest side."""
+    x0, y0, x1, y1 = rect
+    if across_x:
+        c = round(min(max(x0 + at, x0 + NARROWEST), x1 - NARROWEST), 2)
+        return (x0, y0, c, y1), (c, y0, x1, y1)
+    c = round(min(max(y0 + at, y0 + NARROWEST), y1 - NARROWEST), 2)
+    return (x0, y0, x1, c), (x0, c, x1, y1)
+
+
+def _cut_along_corridor(rect: Rect, rng: Random, config: HomeConfig, out: list[Rect], halls: list[Rect]) -> bool:
+    """A corridor along the long side with rooms on both sides, or on one; false if the wing is too small."""
+    x0, y0, x1, y1 = rect
+    turned = y1 - y0 > x1 - x0
+    if turned:
+        x0, y0, x1, y1 = y0, x0, y1, x1
+    length, depth = x1 - x0, y1 - y0
+    width = rng.uniform(*config.corridor_width)
+    if depth < width + LEAST_SIDE + 0.3 or length < 5.5:
+        return False
+    if depth < width + 2 * LEAST_SIDE + 0.2:
+        low = 0.0 if rng.random() < 0.5 else depth - width
+    else:
+        low = min(max(rng.uniform(0.35, 0.65) * (depth - width), LEAST_SIDE), depth - width - LEAST_SIDE)
+    a, b = round(y0 + low, 2), round(y0 + low + width, 2)
+    if low == 0.0:
+        a = y0
+    elif low == depth - width:
+        b = y1
+    rooms: list[Rect] = []
+    start, end = x0, x1
+    if length > 8.0 and rng.random() < 0.6:  # one room takes the whole end, the corridor stops at its wall
+        if rng.random() < 0.5:
+            end = round(x1 - rng.uniform(3.2, min(5.5, length * 0.45)), 2)
+            rooms.append((end, y0, x1, y1))
+        else:
+            start = round(x0 + rng.uniform(3.2, min(5.5, length * 0.45)), 2)
+            rooms.append((x0, y0, start, y1))
+    for low_y, high_y in ((y0, a), (b, y1)):
+        if high_y - low_y > 1.0:
+            rooms += _slice(start, end, low_y, high_y, rng)
+    hall = (start, a, end, b)
+    out += [_swap(room) if turned else room for room in rooms]
+    halls.append(_swap(hall) if turned else hall)
+    return True
+
+
+def _slice(x0: float, x1: float, y0: float, y1: float, rng: Random) -> list[Rect]:
+    """Rooms side by side, of uneven widths; a deep one may have a small room behind it."""
+    depth = y1 - y0
+    wanted = min(max(rng.uniform(9.0, 20.0) / depth, 2.3), 5.5)
+    n = max(round((x1 - x0) / wanted), 1)
+    shares = [rng.uniform(0.6, 1.6) for _ in range(n)]
+    spare = (x1 - x0) - n * NARROWEST
+    if spare < 0:
+        return [(x0, y0, x1, y1)]
+    edges = [x0]
+    for share in shares[:-1]:
+        edges.append(round(edges[-1] + NARROWEST + spare * share / sum(shares), 2))
+    edges.append(x1)
+    return [(a, y0, b, y1) for a, b in pairwise(edges)]
+
+
+def _cut_loft(rect: Rect, rng: Random, out: list[Rect]) -> None:
+    """One large room with one to three small ones cut off at an end."""
+    x0, y0, x1, y1 = rect
+    w, h = x1 - x0, y1 - y0
+    strip = rng.uniform(2.2, 3.6)
+    if max(w, h) < strip + 4.5:
+        _split(rect, rng, 14.0, out)
+        return
+    small, large = _halve(rect, strip, w >= h)
+    if rng.random() < 0.5:
+        large, small = _halve(rect, max(w, h) - strip, w >= h)
+    out.append(large)
+    _split(small, rng, rng.uniform(6.0, 14.0), out)
+
+
+def _swap(rect: Rect) -> Rect:
+    return rect[1], rect[0], rect[3], rect[2]
+
+
+def _drop_corner(rng: Random, rects: list[Rect], halls: list[Rect], least: float) -> list[Rect]:
+    """At times leave a room at the footprint's corner away, so that outlines become stepped."""
+    if len(rects) < 5 or rng.random() > 0.25:
+        return rects
+    x1, y1 = max(r[2] for r in rects), max(r[3] for r in rects)
+    corners = [r for r in rects if r[3] == y1 and (r[2] == x1 or r[0] == 0.0)]
+    total = sum(map(measure, rects)) + sum(map(measure, halls))
+    corners = [r for r in corners if total - measure(r) >= least and measure(r) < 0.3 * total]
+    if not corners:
+        return rects
+    gone = corners[rng.randrange(len(corners))]
+    return [r for r in rects if r is not gone]
+
+
+def _name_rooms(rng: Random, rects: list[Rect], halls: list[Rect]) -> list[Room]:
+    """Give every rectangle a use by its size: the largest is the living room, the small ones baths and stores."""
+    order = sorted(rects, key=measure, reverse=True)
+    small = [r for r in order if measure(r) < 8.0 or min(r[2] - r[0], r[3] - r[1]) < 2.2]
+    if not small and len(order) >= 2:  # every home has a bath: cut one off a middling room
+        whole = order[min(len(order) - 1, 1 + rng.randrange(3))]
+        w, h = whole[2] - whole[0], whole[3] - whole[1]
+        if max(w, h) > NARROWEST + LEAST_SIDE:
+            bath, rest = _halve(whole, rng.uniform(NARROWEST, 2.3), w >= h)
+            order = sorted([r for r in order if r is not whole] + [rest], key=measure, reverse=True)
+            small = [bath]
+        else:
+            small = [order[-1]]
+    large = [r for r in order if r not in small]
+    if not large:
+        large, small = small[:1], small[1:]
+    rooms = [Room("hall", [r]) for r in halls] + [Room("living", [large[0]])]
+    rest = sorted(large[1:], key=lambda r: (not _touch(r, large[0]), rng.random()))
+    uses = ["kitchen", "bedroom", "bedroom"]
+    extra = ["bedroom", "office", "dining", "child", "bedroom", "living", "child", "office"]
+    rooms += [Room(uses[k] if k < 3 else extra[rng.randrange(len(extra))], [r]) for k, r in enumerate(rest)]
+    rng.shuffle(small)
+    baths = ["bath", "wc", "store", "bath", "store", "hall"]
+    rooms += [Room(baths[min(k, 5)], [r]) for k, r in enumerate(small)]
+    return rooms
+
+
+def _touch(a: Rect, b: Rect) -> bool:
+    """Whether two rectangles share at least 1.5 m of an edge."""
+    beside = (a[2] == b[0] or b[2] == a[0]) and min(a[3], b[3]) - max(a[1], b[1]) >= 1.5
+    above = (a[3] == b[1] or b[3] == a[1]) and min(a[2], b[2]) - max(a[0], b[0]) >= 1.5
+    return beside or above
+
+
+def _open_plan(rng: Random, rooms: list[Room]) -> list[Room]:
+    """Take the walls between living room, kitchen and at times dining room and corridor away."""
+    living = next(room for room in rooms if room.kind == "living")
+    joined = {"kitchen", "dining"} | ({"hall"} if rng.random() < 0.5 else set())
+    kept = []
+    for room in rooms:
+        if room.kind in joined and any(_touch(room.rects[0], rect) for rect in living.rects):
+            living.rects += room.rects
+            living.kind = "studio"
+        else:
+            kept.append(room)
+    return kept
+
+
+def _turn(rng: Random, rooms: list[Room]) -> list[Room]:
+    """Mirror and swap the axes at random."""
+    x1 = max(rect[2] for room in rooms for rect in room.rects)
+    y1 = max(rect[3] for room in rooms for rect in room.rects)
+    mirror_x, mirror_y, swap = (rng.random() < 0.5 for _ in range(3))
+
+    def turn(rect: Rect) -> Rect:
+        a, b, c, d = rect
+        if mirror_x:
+            a, c = round(x1 - c, 2), round(x1 - a, 2)
+        if mirror_y:
+            b, d = round(y1 - d, 2), round(y1 - b, 2)
+        return (b, a, d, c) if swap else (a, b, c, d)
+
+    return [Room(room.kind, [turn(rect) for rect in room.rects]) for room in rooms]
