@@ -13,6 +13,7 @@ COMMANDS = {
     "eval": ("vinl.cli.eval", "the whole chain in MuJoCo: a robot crosses floor plans; report, figures, video"),
     "eval-loco": ("vinl.cli.eval_loco", "the locomotor alone in MuJoCo, under random commands"),
     "train-loco": ("vinl.cli.train_loco", "train a locomotor (needs the train extra)"),
+    "train-nav": ("vinl.cli.train_nav", "train a navigator (needs the train extra)"),
     "plans": ("vinl.cli.plans", "list the shipped floor plans, draw a floor plan"),
     "policies": ("vinl.cli.policies", "the trained policies that come with vinl, and their measured figures"),
     "bench": ("vinl.cli.bench", "how fast training physics and the depth camera run here"),

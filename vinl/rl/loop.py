@@ -15,6 +15,7 @@ from torch.utils.tensorboard import SummaryWriter
 from vinl.config.errors import InputError
 from vinl.rl.progress import TrainingProgress
 from vinl.rl.run_folder import RunFolder
+from vinl.rl.stopwatch import Stopwatch
 
 Figures = Callable[[dict[str, float]], dict[str, str]]
 
@@ -101,6 +102,7 @@ class TrainingLoop:
         figures: picks what the progress bar shows from an iteration's measures.
         schedule: called before every iteration with the algorithm and the share of iterations done, to move settings.
         save_every: seconds between checkpoints.
+        stopwatch: whose parts go into the curves where it ran.
 
     Attributes:
         current_learning_iteration: updates done.
@@ -118,10 +120,11 @@ class TrainingLoop:
         figures: Figures,
         schedule: Callable[[Any, float], None],
         save_every: float = 60.0,
+        stopwatch: Stopwatch | None = None,
     ) -> None:
         self.env, self.alg, self.device, self.steps = env, algorithm, device, steps
         self.folder, self.export, self.figures = folder, export, figures
-        self.schedule, self.save_every = schedule, save_every
+        self.schedule, self.save_every, self._stopwatch = schedule, save_every, stopwatch
         self.current_learning_iteration, self.samples = 0, 0
         self._stop = False
 
@@ -197,6 +200,7 @@ class TrainingLoop:
                     **self.describe_policy(),
                     **{f"loss/{name}": float(value) for name, value in losses.items()},
                     **measures,
+                    **({f"seconds/{k}": v for k, v in self._stopwatch.read().items()} if self._stopwatch else {}),
                 }
                 self.folder.append_metrics(
                     {k: float(f"{v:.6g}") if isinstance(v, float) else v for k, v in row.items()}

@@ -1,0 +1,151 @@
+"""``vinl train-nav``: train a navigator."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+
+from vinl.cli.options import parse_options
+from vinl.config.errors import InputError
+
+INTERRUPTED = 130
+"""Exit code after an interrupt that saved."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Train a navigator with PPO in generated homes. The run's folder holds checkpoint, curves and, at any time, the
+    policy.
+
+    Ctrl-C saves and stops; --resume goes on. Any setting of the config can be given as key=value, for example
+    ppo.epochs=1 or motion.shake=0.05.
+    """
+
+    overrides: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    """Settings of the config as key=value."""
+    config: str = "default"
+    """default, paper, blind (shipped configs of nav/), or a YAML file."""
+    from_policy: Annotated[str | None, tyro.conf.arg(name="from")] = None
+    """Start from the network of this navigator (a shipped name or a folder) or run; its sizes must be the config's."""
+    out: str | None = None
+    """Folder of the new run (default: runs/nav-NAME)."""
+    resume: str | None = None
+    """Folder of a run to go on with; its own config is used."""
+    device: str = "auto"
+    """cpu, cuda, or auto: cuda where there is one."""
+    devices: int = 1
+    """GPUs of this machine to train on, each with num_envs robots and homes of its own (on a CPU: processes)."""
+    num_envs: int | None = None
+    """Robots in parallel on each device (default: the config's)."""
+    iterations: int | None = None
+    """Updates in all (default: the config's)."""
+    seed: int | None = None
+    """Of everything random but the homes (default: the config's)."""
+    save_every: float = 60.0
+    """Seconds between checkpoints."""
+
+
+def main(argv: list[str]) -> int:
+    """Run the command; returns 130 after an interrupt."""
+    options = parse_options(Options, argv, "train-nav")
+    if options.save_every <= 0:
+        raise InputError(f"--save-every must be positive, got {options.save_every}")
+    if options.devices < 1:
+        raise InputError(f"--devices must be at least 1, got {options.devices}")
+    if options.iterations is not None and options.iterations < 1:
+        raise InputError(f"--iterations must be at least 1, got {options.iterations}")
+    if options.resume and options.from_policy:
+        raise InputError("--from starts a new run and --resume goes on with an old one; give one of them")
+    fresh = options.overrides or options.config != "default" or options.out or options.num_envs or options.seed
+    if options.resume and fresh:
+        raise InputError("--resume goes on with the run's own config; only --iterations and --device may be given")
+    device = _choose_device(options)
+
+    from vinl.config.loader import load_config
+    from vinl.nav.config import NavConfig
+
+    if options.resume:
+        folder, config = options.resume, None
+    else:
+        short = {"num_envs": options.num_envs, "iterations": options.iterations, "seed": options.seed}
+        overrides = [*options.overrides, *(f"{k}={v}" for k, v in short.items() if v is not None)]
+        config = load_config(NavConfig, _config_source(options.config), overrides)
+        folder = options.out or f"runs/nav-{options.config.removesuffix('.yaml').split('/')[-1]}"
+    if options.devices > 1 and "RANK" not in os.environ:
+        return _start_processes(options.devices, argv)
+    from vinl.nav.training import train_navigator
+
+    complete = train_navigator(
+        config,
+        folder,
+        device,
+        save_every=options.save_every,
+        iterations=options.iterations,
+        from_policy=options.from_policy,
+    )
+    if int(os.environ.get("RANK", "0")) == 0:
+        print(
+            f"trained: {folder}/policy  (try: vinl eval-nav --policy {folder} --out {folder}/eval)"
+            if complete
+            else f"stopped and saved: go on with  vinl train-nav --resume {folder}"
+        )
+    return 0 if complete else INTERRUPTED
+
+
+def _config_source(name: str) -> str:
+    """Bare names are those of the shipped navigation configs."""
+    return name if "/" in name or name.endswith((".yaml", ".yml")) else f"nav/{name}"
+
+
+def _choose_device(options: Options) -> str:
+    import torch
+
+    from vinl.policies.device import choose_device
+
+    device = options.device
+    if device == "auto":
+        device = "cuda" if torch.cuda.is_available() else "cpu"
+    choose_device(device)
+    if device != "cpu" and options.devices > torch.cuda.device_count():
+        raise InputError(f"--devices {options.devices}: there are only {torch.cuda.device_count()} CUDA devices")
+    return device
+
+
+def _start_processes(count: int, argv: list[str]) -> int:
+    """This very command in several processes, as torchrun would start them."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = str(probe.getsockname()[1])
+    common = {**os.environ, "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port, "WORLD_SIZE": str(count)}
+    command = [sys.executable, "-m", "vinl.cli.app", "train-nav", *argv]
+    processes = [
+        subprocess.Popen(command, env={**common, "RANK": str(rank), "LOCAL_RANK": str(rank)}) for rank in range(count)
+    ]
+    try:
+        return _wait_for_all(processes)
+    finally:
+        for process in processes:
+            if process.poll() is None:
+                process.terminate()
+
+
+def _wait_for_all(processes: list[subprocess.Popen[bytes]]) -> int:
+    """The first exit code that is not 0, once all have ended or one has failed."""
+    while True:
+        try:
+            codes = [process.poll() for process in processes]
+            failed = [code for code in codes if code not in (None, 0, INTERRUPTED)]
+            if failed:
+                return failed[0] if failed[0] > 0 else 1
+            if None not in codes:
+                return max(code or 0 for code in codes)
+            time.sleep(0.2)
+        except KeyboardInterrupt:  # the processes were interrupted too: they save and end
+            continue

@@ -1,0 +1,301 @@
+"""Training of the navigator: PPO with memory in the kinematic environment."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import torch
+from rich.console import Console
+from tensordict import TensorDict
+
+from vinl.config.errors import InputError
+from vinl.config.loader import build_config, dump_config
+from vinl.nav.config import NavConfig
+from vinl.nav.environment import DISTANCE_UNIT, NavEnvironment
+from vinl.nav.home_store import HomeStore
+from vinl.policies.card import PolicyCard, navigation_card
+from vinl.policies.commit import find_commit
+from vinl.policies.io import load_policy, save_policy
+from vinl.policies.nav_actor import ACTION_SIZE, OBSERVATION_SIZE, NavActor
+from vinl.rl.learning_rate import DeviceRate
+from vinl.rl.parallel import Peers, join_peers
+from vinl.rl.peer_loop import PeerLoop, peer_folder
+from vinl.rl.recurrent_model import RecurrentActorCritic
+from vinl.rl.recurrent_ppo import RecurrentPPO, RecurrentPpoSettings
+from vinl.rl.recurrent_storage import RecurrentStorage
+from vinl.rl.run_folder import RunFolder
+
+_SEEDS_BETWEEN = 10_000_000
+"""Each process has homes of its own: their seeds lie this far apart."""
+
+_RATE_DOWN, _RATE_UP = 1.5, 1.1
+"""The adaptive learning rate moves by these once an update; rsl-rl's 1.5 both ways when it moves at each minibatch."""
+
+
+class NavTrainingEnv:
+    """The navigation environment as the training loop wants it.
+
+    Args:
+        environment: the robots of this process.
+        privileged: whether observations hold the geodesic distance, for the critic.
+        peers: the processes of the training.
+    """
+
+    def __init__(self, environment: NavEnvironment, privileged: bool = False, peers: Peers | None = None) -> None:
+        self.environment, self._privileged = environment, privileged
+        self.num_envs = environment.num_envs * (peers.count if peers else 1)
+
+    def get_observations(self) -> TensorDict:
+        """Of the present state."""
+        depth, vector = self.environment.observe()
+        return self._pack(depth, vector)
+
+    def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
+        """Actions (n, 2), held to [-1, 1], to observations, rewards (n,), dones (n,) and ``time_outs`` (n,)."""
+        result = self.environment.step(actions.clamp(-1.0, 1.0))
+        return self._pack(result.depth, result.vector), result.reward, result.done, {"time_outs": result.timeout}
+
+    def read_measures(self) -> dict[str, float]:
+        """Figures of the episodes that ended since the last call."""
+        return self.environment.read_measures()
+
+    def save_state(self) -> dict[str, Any]:
+        """Of all robots."""
+        return self.environment.save_state()
+
+    def load_state(self, state: dict[str, Any] | None) -> None:
+        """Go on from a saved state; None: the robots begin anew."""
+        if state is not None:
+            self.environment.load_state(state)
+
+    def _pack(self, depth: torch.Tensor, vector: torch.Tensor) -> TensorDict:
+        seen = {"vector": vector}
+        if self.environment.camera is not None:
+            seen["depth"] = depth
+        if self._privileged:
+            seen["privileged"] = self.environment.state["distance"][:, None] / DISTANCE_UNIT
+        return TensorDict(seen, batch_size=[len(vector)])
+
+
+def train_navigator(
+    config: NavConfig | None,
+    folder: str | Path,
+    device: str = "cpu",
+    name: str = "",
+    save_every: float = 60.0,
+    iterations: int | None = None,
+    from_policy: str | None = None,
+) -> bool:
+    """Train a navigator, or go on with a run. Under torchrun, this is one of the processes.
+
+    Args:
+        config: of a new run; None resumes the run in ``folder``.
+        folder: of the run.
+        device: ``"cpu"`` or ``"cuda"``.
+        name: of the policy; defaults to the folder's.
+        save_every: seconds between checkpoints.
+        iterations: updates in all; defaults to the configuration's.
+        from_policy: start from the weights of this policy or run; default: fresh ones.
+
+    Returns:
+        Whether the run is complete (an interrupt stops it earlier; both leave a checkpoint and a policy).
+
+    Raises:
+        InputError: the folder or a setting cannot be used.
+    """
+    run = RunFolder(folder)
+    resume = config is None
+    if config is None:
+        config = build_config(NavConfig, run.open(), source=str(run.path / "config.yaml"))
+    check_minibatches(config)
+    peers, device = join_peers(device)
+    origin = None
+    start = load_start(from_policy, config) if from_policy else None
+    if not resume and peers.leads:
+        run.create(dump_config(config))
+        if start is not None:
+            run.write_origin(origin := {"policy": str(from_policy), "samples": start[1].samples})
+    if resume:
+        origin = run.read_origin()
+    if device.startswith("cuda"):
+        torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = torch.backends.cudnn.benchmark = True
+    torch.manual_seed(config.seed + peers.rank)
+    own = separate(config, peers.rank)
+    environment = build_environment(own, device, peers)
+    algorithm = build_algorithm(config, device, peers, None if start is None else start[0])
+    commit = find_commit()
+
+    def export(model: RecurrentActorCritic, samples: int) -> None:
+        if peers.leads:
+            assert isinstance(model.actor, NavActor)
+            save_policy(run.policy, model.actor, make_card(name or run.path.name, config, samples, commit, origin))
+
+    def schedule(learner: RecurrentPPO, share: float) -> None:
+        learner.rate.limit(*config.ppo.rate_limits(share))
+        learner.settings.entropy = config.ppo.entropy_at(share)
+
+    loop = PeerLoop(
+        peers,
+        NavTrainingEnv(environment, config.network.privileged, peers),
+        algorithm,
+        config.ppo.steps,
+        peer_folder(run, peers),
+        device,
+        export,
+        describe_figures,
+        schedule,
+        save_every,
+    )
+    if resume:
+        loop.resume()
+    try:
+        return loop.train(iterations or config.iterations)
+    finally:
+        peers.close()
+
+
+def describe_figures(row: dict[str, float]) -> dict[str, str]:
+    """What the progress bar shows."""
+    shown = {"samples/s": f"{row['samples_per_second']:,.0f}", "samples": f"{row['samples'] / 1e6:.1f} M"}
+    for key, digits in (("success", 3), ("spl", 3), ("collisions", 1)):
+        if key in row:
+            shown[key] = f"{row[key]:.{digits}f}"
+    return {**shown, "rate": f"{row['learning_rate']:.1e}"}
+
+
+def check_minibatches(config: NavConfig) -> None:
+    """Robots must divide into minibatches.
+
+    Raises:
+        InputError: they do not.
+    """
+    if config.num_envs % config.ppo.minibatches:
+        raise InputError(
+            f"num_envs must be a multiple of ppo.minibatches, got {config.num_envs} and {config.ppo.minibatches}"
+        )
+
+
+def separate(config: NavConfig, rank: int) -> NavConfig:
+    """The configuration with a process's own homes and random numbers."""
+    homes = replace(config.homes, seed=config.homes.seed + rank * _SEEDS_BETWEEN)
+    return replace(config, seed=config.seed + rank, homes=homes)
+
+
+def build_environment(config: NavConfig, device: str, peers: Peers | None = None) -> NavEnvironment:
+    """Homes and robots; a line on the terminal counts the homes."""
+    console = Console(stderr=True)
+    shown = console.status("building homes") if peers is None or peers.leads else nullcontext()
+    with shown as status:
+
+        def progress(done: int, total: int) -> None:
+            if status is not None:
+                status.update(f"building homes: {done} of {total}")
+
+        homes = HomeStore.build(config, device, progress)
+    environment = NavEnvironment(config, homes, device)
+    environment.stagger()
+    return environment
+
+
+def build_actor(config: NavConfig) -> NavActor:
+    """A navigator with fresh weights."""
+    c, n = config.camera, config.network
+    return NavActor(
+        vision=n.vision if c is not None else "none",
+        height=c.height if c is not None else 1,
+        width=c.width if c is not None else 1,
+        visual=n.visual,
+        embedding=n.embedding,
+        hidden=n.hidden,
+        layers=n.layers,
+        memory=n.memory,
+        planes=n.planes,
+    )
+
+
+def build_algorithm(
+    config: NavConfig, device: str, peers: Peers | None = None, weights: dict[str, torch.Tensor] | None = None
+) -> RecurrentPPO:
+    """Network, buffers and PPO as the configuration says.
+
+    Args:
+        config: of the training.
+        device: torch device.
+        peers: the processes of the training.
+        weights: of the actor; default: fresh ones.
+    """
+    p = config.ppo
+    actor = build_actor(config)
+    if weights is not None:
+        actor.load_state_dict(weights)
+    model = RecurrentActorCritic(
+        actor, p.log_std, p.log_std_range, privileged=int(config.network.privileged), values=config.network.values
+    ).to(device)
+    storage = RecurrentStorage(
+        p.steps,
+        config.num_envs,
+        actor.image,
+        p.image_type,
+        OBSERVATION_SIZE,
+        int(config.network.privileged),
+        ACTION_SIZE,
+        actor.initial_state(config.num_envs, device),
+        device,
+    )
+    low, high = p.rate_limits(0.0)
+    rate = DeviceRate(
+        p.learning_rate,
+        low,
+        high,
+        p.desired_kl if p.schedule == "adaptive" else None,
+        _RATE_DOWN,
+        _RATE_DOWN if p.adapt_each else _RATE_UP,
+        device,
+    )
+    settings = RecurrentPpoSettings(
+        epochs=p.epochs,
+        minibatches=p.minibatches,
+        gamma=p.gamma,
+        lam=p.lam,
+        clip=p.clip,
+        value=p.value,
+        entropy=p.entropy,
+        max_grad_norm=p.max_grad_norm,
+        bf16=p.bf16,
+        compiled=p.compiled,
+        graphs=p.graphs,
+        adapt_each=p.adapt_each,
+    )
+    return RecurrentPPO(model, storage, rate, settings, peers)
+
+
+def load_start(policy: str, config: NavConfig) -> tuple[dict[str, torch.Tensor], PolicyCard]:
+    """Weights and card of a trained navigator to start from.
+
+    Raises:
+        InputError: it is no navigator, or has another network than the configuration.
+    """
+    loaded = load_policy(policy)
+    with torch.device("meta"):
+        wanted = build_actor(config).describe()
+    if not isinstance(loaded.network, NavActor):
+        raise InputError(f"--from {policy}: a {loaded.card.kind} policy; give a navigator")
+    given = loaded.network.describe()
+    if given != wanted:
+        other = [f"{k} {given.get(k)} instead of {wanted[k]}" for k in wanted if given.get(k) != wanted[k]]
+        raise InputError(f"--from {policy}: another network than the config's: {', '.join(other)}")
+    return loaded.network.state_dict(), loaded.card
+
+
+def make_card(
+    name: str, config: NavConfig, samples: int, commit: str, origin: dict[str, Any] | None = None
+) -> PolicyCard:
+    """The card of a navigator of this training; ``origin`` describes the policy that it started from."""
+    with torch.device("meta"):
+        network = build_actor(config).describe()
+    training = {**dump_config(config), **({"origin": origin} if origin else {})}
+    camera = config.camera.record().describe() if config.camera is not None else None
+    return navigation_card(name, network, camera, training=training, seed=config.seed, samples=samples, commit=commit)
