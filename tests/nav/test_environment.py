@@ -1,0 +1,69 @@
+"""Robots in homes: motion, reward, ends, restarts, repetition."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from vinl.config.errors import InputError
+from vinl.nav.config import EpisodeConfig
+from vinl.nav.environment import NavEnvironment
+
+
+def test_steps_are_well_formed(config, homes):
+    environment = NavEnvironment(config, homes)
+    depth, vector = environment.observe()
+    assert depth.shape == (32, 12, 16) and depth.dtype == torch.float16 and vector.shape == (32, 5)
+    assert (vector[:, 3:] == 0).all()
+    for _ in range(20):
+        action = torch.rand(32, 2) * 3 - 1.5
+        step = environment.step(action)
+        assert all(torch.isfinite(x.float()).all() for x in step)
+        assert step.depth.min() >= 0 and step.depth.max() <= 1
+        going = ~step.done
+        torch.testing.assert_close(step.vector[going, 3:], action[going].clamp(-1, 1))
+        torch.testing.assert_close(step.vector[:, 1:3].norm(dim=1), torch.ones(32))
+    measures = environment.read_measures()
+    assert measures["blocked"] > 0 and measures["evicted"] == measures["unplaced"] == 0
+
+
+def test_same_seed_same_episodes(config, homes):
+    def run(seed):
+        environment = NavEnvironment(config, homes, seed=seed)
+        generator = torch.Generator().manual_seed(0)
+        steps = [environment.step(torch.rand(32, 2, generator=generator) * 2 - 1) for _ in range(6)]
+        return torch.stack([s.depth.float().sum() + s.vector.sum() + s.reward.sum() for s in steps])
+
+    first = run(3)
+    assert (first == run(3)).all()
+    assert (first != run(4)).any()
+
+
+def test_goes_on_from_a_saved_state(config, homes):
+    environment, other = NavEnvironment(config, homes, seed=3), NavEnvironment(config, homes, seed=4)
+    action = torch.full((32, 2), 0.3)
+    environment.step(action)
+    other.load_state(environment.save_state())
+    for a, b in zip(environment.step(action), other.step(action), strict=True):
+        assert (a == b).all()
+    with pytest.raises(InputError, match="not 8"):
+        NavEnvironment(replace(config, num_envs=8), homes).load_state(environment.save_state())
+
+
+def test_starts_lie_within_the_range(config, homes):
+    config = replace(config, num_envs=500, episodes=EpisodeConfig(distance=(4.0, 6.0)), camera=None)
+    environment = NavEnvironment(config, homes)
+    assert environment.distance.min() >= 4.0 and environment.distance.max() <= 6.0
+    still = environment.step(torch.tensor([[-1.0, 0.0]]).expand(500, 2))
+    assert still.depth.shape == (500, 0, 0)
+    assert environment.read_measures()["blocked"] == 0
+
+
+def test_time_runs_out(config, homes):
+    config = replace(config, episodes=EpisodeConfig(distance=(3.0, 30.0), steps=5), camera=None)
+    environment = NavEnvironment(config, homes)
+    for k in range(5):
+        step = environment.step(torch.tensor([[-1.0, 0.5]]).expand(32, 2))
+        assert step.done.all() == step.timeout.all() == (k == 4)
+    measures = environment.read_measures()
+    assert measures["episodes"] == 32 and measures["success"] == 0 and measures["steps"] == 5

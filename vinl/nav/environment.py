@@ -1,0 +1,318 @@
+"""The kinematic navigation environment: thousands of robots in many homes at once, in torch and Warp on one device."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+import warp as wp
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from vinl.config.errors import InputError
+from vinl.nav.config import NavConfig
+from vinl.nav.home_store import HomeStore
+from vinl.nav.kernels import Robots, aim_cameras, move_robots, place_robots, render_interior
+from vinl.nav.measures import EpisodeEnd, Measures, end_episodes
+from vinl.nav.rules import write_rules
+from vinl.robot.cameras import Camera
+from vinl.sensing.depth import check_device
+
+DISTANCE_UNIT = 5.0
+"""The observation holds the distance to the goal in this unit [m]."""
+
+_STATE = {
+    "home": (torch.int32, (), None),
+    "generation": (torch.int32, (), None),
+    "goal": (torch.int32, (), None),
+    "position": (torch.float32, (2,), wp.vec2),
+    "yaw": (torch.float32, (), None),
+    "speed": (torch.float32, (), None),
+    "yaw_rate": (torch.float32, (), None),
+    "distance": (torch.float32, (), None),
+    "gain": (torch.float32, (3,), wp.vec3),
+    "mount": (torch.float32, (4,), wp.vec4),
+}
+
+
+class NavStep(NamedTuple):
+    """What a step gives.
+
+    Attributes:
+        depth: (n, H, W) float16 in [0, 1]; of the new episode where done. (n, 0, 0) if the robots are blind.
+        vector: (n, 5) float32: distance to the goal / 5 m, cosine and sine of its bearing (left is positive), and the
+            previous action, 0 at the start; of the new episode where done.
+        reward: (n,) float32.
+        done: (n,) bool, an episode ended with this step.
+        timeout: (n,) bool, it ended for want of time (or because its home was replaced), not at the goal.
+    """
+
+    depth: Float[Tensor, "n height width"]
+    vector: Float[Tensor, "n 5"]
+    reward: Float[Tensor, " n"]
+    done: Bool[Tensor, " n"]
+    timeout: Bool[Tensor, " n"]
+
+
+class NavEnvironment:
+    """Robots that drive to goals.
+
+    An action in [-1, 1]² holds for 0.5 s: forward speed (a0 + 1) / 2 x 1 m/s, yaw rate a1 x 60 deg/s. A step whose
+    swept footprint would touch a wall or furniture is cancelled as a whole. An episode ends with success as soon as
+    the robot is near its goal; there is no stop action.
+
+    Nothing in ``step`` waits for the device. The same seed, configuration and homes give the same episodes.
+
+    Args:
+        config: of the environment.
+        homes: that the robots drive in.
+        device: ``"cpu"``, ``"cuda"`` or ``"cuda:1"``, the homes' too.
+        seed: of everything random but the homes; that of the configuration by default.
+
+    Attributes:
+        num_envs: robots.
+        camera: its record, or None if the robots are blind.
+        ended: figures of the episodes that ended in the last step, see ``EpisodeEnd``; None before the first.
+        state: the robots' tensors by name, see ``kernels.Robots``; to be read.
+
+    Raises:
+        InputError: the device is not there, or not the homes'.
+    """
+
+    def __init__(
+        self, config: NavConfig, homes: HomeStore, device: str | torch.device = "cpu", seed: int | None = None
+    ) -> None:
+        self.config, self.homes = config, homes
+        self.device = check_device(device)
+        if self.device != homes.device:
+            raise InputError(f"the environment is on {self.device}, its homes are on {homes.device}; use one device")
+        self.num_envs = n = config.num_envs
+        self.camera: Camera | None = None if config.camera is None else config.camera.record()
+        self._rules = write_rules(config)
+        self.state = {name: self._zeros(n, *shape, dtype=dtype) for name, (dtype, shape, _) in _STATE.items()}
+        self._robots = Robots()
+        for name, (_, _, vector) in _STATE.items():
+            setattr(self._robots, name, wp.from_torch(self.state[name], dtype=vector))
+        counts = ("steps", "path", "collisions", "in_a_row", "start_distance", "unplaced")
+        self.state |= {name: self._zeros(n) for name in counts}
+        self.state["action"] = self._zeros(n, 2)
+        self.state["chance"] = self._zeros(2, dtype=torch.int32)
+        self._moved, self._blocked, self._straight = (self._zeros(n) for _ in range(3))
+        self._eye = self._zeros(n, 3), self._zeros(n, 3, 3), self._zeros(n)
+        self._chosen = self._zeros(n, dtype=torch.bool)
+        self._wrapped = {
+            "chance": wp.from_torch(self.state["chance"]),
+            "action": wp.from_torch(self.state["action"], dtype=wp.vec2),
+            "unplaced": wp.from_torch(self.state["unplaced"]),
+            "moved": wp.from_torch(self._moved),
+            "blocked": wp.from_torch(self._blocked),
+            "straight": wp.from_torch(self._straight),
+            "chosen": wp.from_torch(self._chosen),
+            "eye": wp.from_torch(self._eye[0], dtype=wp.vec3),
+            "turn": wp.from_torch(self._eye[1], dtype=wp.mat33),
+            "holes": wp.from_torch(self._eye[2]),
+        }
+        self._measures = Measures(self.device)
+        self.ended: EpisodeEnd | None = None
+        self._observation: tuple[Tensor, Tensor] | None = None
+        self.restart(seed=config.seed if seed is None else seed)
+
+    # ---- what a training calls ------------------------------------------------------------------------------------
+
+    def observe(self) -> tuple[Float[Tensor, "n height width"], Float[Tensor, "n 5"]]:
+        """Depth and vector of the present state, as in ``NavStep``; the same until the next step."""
+        if self._observation is None:
+            self._observation = self._look()
+        return self._observation
+
+    def step(self, action: Float[Tensor, "n 2"]) -> NavStep:
+        """Move all robots for 0.5 s; where an episode ends, the next one begins.
+
+        Args:
+            action: forward speed and yaw rate in [-1, 1]; held to that.
+        """
+        reward, done, timeout = self.advance(action)
+        self._start(done)
+        depth, vector = self.observe()
+        return NavStep(depth, vector, reward, done, timeout)
+
+    @property
+    def distance(self) -> Float[Tensor, " n"]:
+        """Geodesic distance to the goal [m]; what the robots themselves do not know. Changes with the next step."""
+        return self.state["distance"]
+
+    def read_measures(self) -> dict[str, float]:
+        """Means over the episodes that ended since the last call (``success``, ``spl``, ``soft_spl``, ``collisions``,
+        ``steps``, ``path`` and ``start_distance``, ``end_distance`` [m], shares that were ``stuck``, ``looping``,
+        ``out_of_time``; absent if none ended), their number ``episodes``; over all steps ``reward``, the share
+        ``blocked`` and ``step_length`` [m]; and how many were ``evicted`` because their home was replaced, or
+        ``unplaced``: started off the range of distances, because no start within it was found. The host waits here."""
+        return self._measures.read(self.state["unplaced"])
+
+    def save_state(self) -> dict[str, Any]:
+        """Everything that ``load_state`` needs to go on, on the CPU."""
+        tensors = {name: tensor.detach().cpu().clone() for name, tensor in self.state.items()}
+        return {"robots": tensors, "homes": self.homes.save_state()}
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Go on from a saved state. If the homes are other ones, because fresh ones had come, all robots begin anew.
+
+        Raises:
+            InputError: the state is of another number of robots.
+        """
+        saved = state["robots"]
+        if saved.keys() != self.state.keys() or len(saved["home"]) != self.num_envs:
+            raise InputError(f"the saved state is of {len(saved.get('home', ()))} robots, not {self.num_envs}")
+        if self.homes.holds(state["homes"]):
+            for name, tensor in saved.items():
+                self.state[name].copy_(tensor)
+            self.state["generation"].copy_(self.homes.generations()[self.state["home"].long()])
+        else:
+            self.state["chance"].copy_(saved["chance"])
+            self._start(torch.ones(self.num_envs, dtype=torch.bool, device=self.device))
+        self._observation = None
+
+    # ---- its parts, for those who need an episode's last picture --------------------------------------------------
+
+    def advance(
+        self, action: Float[Tensor, "n 2"]
+    ) -> tuple[Float[Tensor, " n"], Bool[Tensor, " n"], Bool[Tensor, " n"]]:
+        """The first half of a step: move, reward, count. ``restart(done)`` must follow before the next.
+
+        Returns:
+            reward, done and timeout, as in ``NavStep``.
+        """
+        state, rules = self.state, self.config.reward
+        self.homes.refresh()
+        state["action"].copy_(action.detach()).clamp_(-1.0, 1.0)
+        state["chance"][1] += 1
+        evicted = state["generation"] != self.homes.generations()[state["home"].long()]
+        before = state["distance"].clone()
+        self._launch(
+            move_robots,
+            self.num_envs,
+            [self.homes.homes, self._rules, "chance", "action", self._robots, "moved", "blocked", "straight"],
+        )
+        state["steps"] += 1
+        state["path"] += self._moved
+        state["collisions"] += self._blocked
+        state["in_a_row"].add_(1).mul_(self._blocked)
+        episodes = self.config.episodes
+        success = (self._straight < episodes.success_radius) & (state["distance"] < episodes.success_geodesic)
+        success &= ~evicted
+        timeout = ((state["steps"] >= episodes.steps) & ~success) | evicted
+        done = success | timeout
+        reward = rules.progress * (before - state["distance"]) + rules.success * success
+        reward = torch.where(evicted, 0.0, rules.scale * (reward + rules.slack + rules.collision * self._blocked))
+        self.ended = end_episodes(
+            done & ~evicted,
+            state["home"],
+            success,
+            state["collisions"],
+            state["in_a_row"],
+            state["steps"],
+            state["path"],
+            state["start_distance"],
+            state["distance"],
+            episodes.success_radius,
+        )
+        self._measures.add(self.ended, reward, self._blocked, self._moved, evicted)
+        self._observation = None
+        return reward, done, timeout
+
+    def restart(self, chosen: Bool[Tensor, " n"] | None = None, seed: int | None = None) -> None:
+        """Begin new episodes.
+
+        Args:
+            chosen: (n,) of these robots; of all by default.
+            seed: begin the row of random numbers anew, so that what follows is the same each time.
+        """
+        if seed is not None:
+            mixed = int(np.random.SeedSequence(seed).generate_state(1)[0]) >> 1
+            self.state["chance"].copy_(torch.tensor([mixed, 0], dtype=torch.int32))
+        self._start(torch.ones(self.num_envs, dtype=torch.bool, device=self.device) if chosen is None else chosen)
+
+    def place(
+        self,
+        home: Int[Tensor, " n"],
+        goal: Int[Tensor, " n"],
+        position: Float[Tensor, "n 2"],
+        yaw: Float[Tensor, " n"],
+    ) -> None:
+        """Put all robots where one wants them; distances follow with the next step.
+
+        Args:
+            home: slot of the store.
+            goal: number of the goal in that home.
+            position: of the robots' middles [m].
+            yaw: headings [rad].
+        """
+        self.restart()
+        for name, values in (("home", home), ("goal", goal), ("position", position), ("yaw", yaw)):
+            self.state[name].copy_(torch.as_tensor(values))
+        self.state["generation"].copy_(self.homes.generations()[self.state["home"].long()])
+        self.state["speed"].zero_()
+        # a step on the spot: reads the distances and moves nothing
+        self.state["action"].copy_(torch.tensor([-1.0, 0.0]))
+        self._launch(
+            move_robots,
+            self.num_envs,
+            [self.homes.homes, self._rules, "chance", "action", self._robots, "moved", "blocked", "straight"],
+        )
+        self.state["action"].zero_()
+        self.state["start_distance"].copy_(self.state["distance"])
+        self._observation = None
+
+    def stagger(self) -> None:
+        """Let the present episodes look as if each had begun a random while ago, so that not all run out of time at
+        once; for the start of a training."""
+        generator = torch.Generator().manual_seed(int(self.state["chance"][0].item()))
+        self.state["steps"].copy_(torch.randint(0, self.config.episodes.steps, (self.num_envs,), generator=generator))
+
+    def goals(self) -> Float[Tensor, "n 2"]:
+        """Where each robot's goal is [m]."""
+        return wp.to_torch(self.homes.homes.goals)[self.state["home"].long(), self.state["goal"].long()]
+
+    # ---- inside ---------------------------------------------------------------------------------------------------
+
+    def _start(self, chosen: Tensor) -> None:
+        state = self.state
+        self._chosen.copy_(chosen)
+        self._launch(
+            place_robots,
+            self.num_envs,
+            [self.homes.homes, self._rules, "chance", "chosen", self._robots, "unplaced"],
+        )
+        for name in ("steps", "path", "collisions", "in_a_row"):
+            state[name].masked_fill_(chosen, 0.0)
+        state["action"].masked_fill_(chosen[:, None], 0.0)
+        state["start_distance"].copy_(torch.where(chosen, state["distance"], state["start_distance"]))
+        self._observation = None
+
+    def _look(self) -> tuple[Tensor, Tensor]:
+        n, state = self.num_envs, self.state
+        to_goal = self.goals() - state["position"]
+        bearing = torch.atan2(to_goal[:, 1], to_goal[:, 0]) - state["yaw"]
+        distance = torch.linalg.vector_norm(to_goal, dim=1) / DISTANCE_UNIT
+        vector = torch.cat([torch.stack([distance, bearing.cos(), bearing.sin()], 1), state["action"]], 1)
+        if self.camera is None:
+            return torch.zeros(n, 0, 0, dtype=torch.float16, device=self.device), vector
+        depth = torch.empty(n, self.camera.height, self.camera.width, dtype=torch.float16, device=self.device)
+        self._launch(aim_cameras, n, [self._rules, "chance", self._robots, "eye", "turn", "holes"])
+        self._launch(
+            render_interior,
+            tuple(depth.shape),
+            [self.homes.homes, self._rules, "chance", self._robots, "eye", "turn", "holes", wp.from_torch(depth)],
+        )
+        return depth, vector
+
+    def _launch(self, kernel: Any, dim: int | tuple[int, ...], inputs: list[Any]) -> None:
+        stream = None
+        if self.device.type == "cuda":
+            stream = wp.stream_from_torch(torch.cuda.current_stream(self.device))
+        arrays = [self._wrapped[x] if isinstance(x, str) else x for x in inputs]
+        wp.launch(kernel, dim=dim, inputs=arrays, device=str(self.device), stream=stream)
+
+    def _zeros(self, *shape: int, dtype: torch.dtype = torch.float32) -> Tensor:
+        return torch.zeros(*shape, dtype=dtype, device=self.device)

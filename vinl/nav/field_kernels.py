@@ -1,0 +1,117 @@
+"""The Warp kernels that fill distance fields and clearance grids. A file of their own: Warp compiles them."""
+
+# ruff: noqa: UP018, RUF046 - a variable of a kernel that changes must be made by its type
+# pyright: reportInvalidTypeForm=false, reportCallIssue=false, reportArgumentType=false
+# pyright: reportOperatorIssue=false, reportIndexIssue=false, reportAttributeAccessIssue=false
+
+from typing import no_type_check
+
+import warp as wp
+
+from vinl.sensing.warp_start import start_warp
+
+start_warp()
+wp.set_module_options({"enable_backward": False})
+
+BUCKETS = wp.constant(256)
+"""More than the dearest step."""
+
+
+@wp.kernel
+@no_type_check
+def spread_distances(
+    mask: wp.array(dtype=wp.uint8),
+    goal: wp.array(dtype=wp.int32),
+    offset: wp.array(dtype=wp.int32),
+    cost: wp.array(dtype=wp.int32),
+    distance: wp.array(dtype=wp.int32, ndim=2),
+    head: wp.array(dtype=wp.int32, ndim=2),
+    following: wp.array(dtype=wp.int32, ndim=2),
+    cell: wp.array(dtype=wp.int32, ndim=2),
+):
+    """Dijkstra's search with buckets, one thread a goal. Cells of mask 2 are passed, cells of mask 1 only reached.
+
+    ``head`` holds a linked list of waiting entries for each bucket, ``following`` and ``cell`` the entries.
+    """
+    k = wp.tid()
+    used = int(1)  # entries taken from the pool so far
+    spare = int(-1)  # list of entries given back
+    waiting = int(1)
+    band = int(0)
+    distance[k, goal[k]] = 0
+    head[k, 0] = 0
+    following[k, 0] = -1
+    cell[k, 0] = goal[k]
+    while waiting > 0:
+        bucket = band % BUCKETS
+        entry = head[k, bucket]
+        while entry >= 0:
+            head[k, bucket] = following[k, entry]
+            here = cell[k, entry]
+            following[k, entry] = spare
+            spare = entry
+            waiting = waiting - 1
+            if distance[k, here] == band and mask[here] == wp.uint8(2):
+                for s in range(offset.shape[0]):
+                    there = here + offset[s]
+                    total = band + cost[s]
+                    if mask[there] != wp.uint8(0) and total < distance[k, there]:
+                        fresh = spare
+                        if fresh >= 0:
+                            spare = following[k, fresh]
+                        else:
+                            fresh = used
+                            used = used + 1
+                        if fresh < cell.shape[1]:
+                            distance[k, there] = total
+                            target = total % BUCKETS
+                            cell[k, fresh] = there
+                            following[k, fresh] = head[k, target]
+                            head[k, target] = fresh
+                            waiting = waiting + 1
+            entry = head[k, bucket]
+        band = band + 1
+
+
+@wp.kernel
+@no_type_check
+def measure_down(free: wp.array(dtype=wp.uint8, ndim=2), reach: wp.int32, gap: wp.array(dtype=wp.int32, ndim=2)):
+    """Cells to the nearest one that is not free in the same column, at most ``reach``; outside nothing is free."""
+    column = wp.tid()
+    rows = free.shape[0]
+    run = int(0)
+    for r in range(rows):
+        run = wp.where(free[r, column] == wp.uint8(0), 0, wp.min(run + 1, reach))
+        gap[r, column] = run
+    run = int(0)
+    for i in range(rows):
+        r = rows - 1 - i
+        run = wp.where(free[r, column] == wp.uint8(0), 0, wp.min(run + 1, reach))
+        gap[r, column] = wp.min(gap[r, column], run)
+
+
+@wp.kernel
+@no_type_check
+def measure_across(
+    gap: wp.array(dtype=wp.int32, ndim=2),
+    reach: wp.int32,
+    resolution: wp.float32,
+    clearance: wp.array(dtype=wp.float16, ndim=2),
+):
+    """Distance [m] from a cell's centre to the edge of the nearest cell that is not free, held to ``reach`` cells."""
+    r, c = wp.tid()
+    columns = gap.shape[1]
+    best = gap[r, c] * gap[r, c]
+    d = int(1)
+    while d * d < best and d <= reach:
+        left = int(0)
+        right = int(0)
+        if c - d >= 0:
+            left = gap[r, c - d]
+        if c + d < columns:
+            right = gap[r, c + d]
+        near = wp.min(left, right)
+        best = wp.min(best, d * d + near * near)
+        d = d + 1
+    value = wp.max((wp.sqrt(wp.float32(best)) - 0.5) * resolution, 0.0)
+    clearance[r, c] = wp.float16(value)

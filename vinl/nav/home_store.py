@@ -1,0 +1,290 @@
+"""Thousands of homes on one device: distance fields, clearance, starts, and meshes for the camera."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+import warp as wp
+
+from vinl.config.errors import InputError
+from vinl.nav.config import NavConfig
+from vinl.nav.home_builder import BuiltHome, prepare_home
+from vinl.nav.home_stream import HomeStream, count_workers
+from vinl.nav.kernels import Homes
+from vinl.sensing.depth import check_device
+from vinl.world.floorplan import FloorPlan
+
+_TRIES = 50
+"""So many homes dropped for each one kept, and the configuration is refused."""
+
+_SPARE_ROOM = 1.3
+"""A fresh home takes the place of one up to this much larger."""
+
+_KEPT = 64
+"""Meshes of homes gone that are kept a while: launches that read them may not have run yet."""
+
+
+@dataclass(frozen=True, eq=False)
+class HomeRecord:
+    """What the host remembers of a home.
+
+    Attributes:
+        seed, name: see ``BuiltHome``.
+        solid: (n, 7) boxes of walls and furniture.
+        blocks: (m, 6) clutter.
+        goals: (goals, 2) [m].
+    """
+
+    seed: int
+    name: str
+    solid: np.ndarray
+    blocks: np.ndarray
+    goals: np.ndarray
+
+
+class HomeStore:
+    """Homes on a device, each in a slot of its own size; a slot can take another home while robots run.
+
+    Args:
+        built: at least one home, all with as many goals and starts.
+        device: ``"cpu"``, ``"cuda"`` or ``"cuda:1"``.
+        dropped: how many homes were dropped on the way here, because no path led through them.
+        tree: how Warp builds the ray trees of the meshes: ``"sah"`` (on the host), ``"lbvh"`` (on a GPU); Warp
+            chooses by default.
+
+    Attributes:
+        records: of the home in every slot.
+        homes: the grids on the device, for the kernels.
+        device: torch device.
+        dropped: homes without a path so far; they are never used.
+        replaced: homes that took another's place so far.
+        skipped: fresh homes that found no slot of their size.
+
+    Raises:
+        InputError: there is no home, or no such device.
+    """
+
+    def __init__(
+        self, built: Sequence[BuiltHome], device: str | torch.device = "cpu", dropped: int = 0, tree: str | None = None
+    ) -> None:
+        if not built:
+            raise InputError("the navigation environment needs at least one home")
+        self.device = check_device(device)
+        self._warp_device, self._tree = str(self.device), tree
+        self.records = [_record(home) for home in built]
+        self.dropped, self.replaced, self.skipped = dropped, 0, 0
+        self._capacity = np.array([home.cells for home in built])
+        self._age = np.arange(len(built))
+        self._mesh: list[wp.Mesh] = [self._build_mesh(home) for home in built]
+        self._gone: deque[wp.Mesh] = deque(maxlen=_KEPT)
+        self._stream: HomeStream | None = None
+        self._due, self._pace = 0.0, 0.0
+        goals, starts = len(built[0].goals), len(built[0].starts)
+        slots, cells = len(built), int(self._capacity.sum())
+        if cells * 4 >= 2**31:
+            raise InputError(f"{slots} homes have {cells} cells together; a store holds up to {2**29}: use fewer homes")
+        first = np.concatenate([[0], np.cumsum(self._capacity)[:-1]])
+        self._first = first
+        self._tensors = {
+            "first": torch.as_tensor(first.astype(np.int32), device=self.device),
+            "shape": torch.zeros(slots, 2, dtype=torch.int32, device=self.device),
+            "origin": torch.zeros(slots, 2, device=self.device),
+            "clearance": torch.zeros(4 * cells, dtype=torch.float16, device=self.device),
+            "fields": torch.full((cells, goals), float("inf"), dtype=torch.float16, device=self.device),
+            "goals": torch.zeros(slots, goals, 2, device=self.device),
+            "starts": torch.zeros(slots, starts, 2, device=self.device),
+            "generation": torch.zeros(slots, dtype=torch.int32, device=self.device),
+            "meshes": torch.as_tensor(np.array([mesh.id for mesh in self._mesh], np.int64), device=self.device),
+        }
+        vectors = {"shape": wp.vec2i, "origin": wp.vec2, "goals": wp.vec2, "starts": wp.vec2, "meshes": wp.uint64}
+        self.homes = Homes()
+        for name, tensor in self._tensors.items():
+            setattr(self.homes, name, wp.from_torch(tensor, dtype=vectors.get(name)))
+        for slot, home in enumerate(built):
+            self._write(slot, home)
+
+    @classmethod
+    def build(
+        cls,
+        config: NavConfig,
+        device: str | torch.device = "cpu",
+        progress: Callable[[int, int], None] | None = None,
+        tree: str | None = None,
+    ) -> HomeStore:
+        """The homes that a configuration asks for, built by several processes.
+
+        Args:
+            config: of the environment.
+            device: for the homes.
+            progress: called with the homes built so far and how many there will be.
+            tree: as for the class.
+
+        Raises:
+            InputError: hardly any home has a path of the length asked for.
+        """
+        device = check_device(device)  # before minutes of building
+        wanted = config.homes.count
+        workers = count_workers(config, wanted)
+        stream = HomeStream(config, config.homes.seed, workers)
+        built: list[BuiltHome] = []
+        reasons: list[str] = []
+        try:
+            while len(built) < wanted:
+                home = stream.next()
+                if isinstance(home, str):
+                    reasons.append(home)
+                    if len(reasons) > _TRIES * (len(built) + 1):
+                        raise InputError(
+                            f"{len(reasons)} homes were dropped for {len(built)} that can be used; the last: {home}"
+                        )
+                    continue
+                built.append(home)
+                if progress is not None:
+                    progress(len(built), wanted)
+            store = cls(built, device, len(reasons), tree)
+        except BaseException:
+            stream.close()
+            raise
+        if config.homes.fresh > 0:
+            store._stream, store._pace = stream, config.homes.fresh * wanted / 1000
+        else:
+            stream.close()
+        return store
+
+    @classmethod
+    def from_plans(
+        cls, plans: Iterable[FloorPlan], config: NavConfig, device: str | torch.device = "cpu", copies: int = 1
+    ) -> HomeStore:
+        """Given floor plans, each with ``config.homes.goals`` goals.
+
+        Args:
+            plans: on grids of 5 cm.
+            config: of the environment; its generator is not used.
+            device: for the homes.
+            copies: times that every plan is there, each with other goals.
+
+        Raises:
+            InputError: none of the plans can be used; the message says why not.
+        """
+        built: list[BuiltHome] = []
+        reasons: list[str] = []
+        for k, plan in enumerate(plans):
+            for copy in range(copies):
+                home = prepare_home(plan, config.homes.seed + k * copies + copy, config)
+                if isinstance(home, str):
+                    reasons.append(home)
+                else:
+                    built.append(home)
+        if not built:
+            raise InputError("no floor plan can be used" + (f"; the last: {reasons[-1]}" if reasons else ""))
+        return cls(built, device, len(reasons))
+
+    def __len__(self) -> int:
+        """How many homes there are."""
+        return len(self.records)
+
+    @property
+    def memory_bytes(self) -> int:
+        """Device memory of all homes but their meshes' ray trees."""
+        return sum(t.numel() * t.element_size() for t in self._tensors.values()) + sum(
+            mesh.points.capacity + mesh.indices.capacity for mesh in self._mesh
+        )
+
+    def refresh(self) -> int:
+        """Put fresh homes, as far as they are due and ready, in the place of old ones; call it once a step.
+
+        The host never waits. The slot's generation grows by one, by which the environment knows the robots that were
+        there.
+
+        Returns:
+            How many homes were replaced.
+        """
+        if self._stream is None:
+            return 0
+        self._due = min(self._due + self._pace, float(len(self)))
+        count = 0
+        if self._due >= 1:
+            for home in self._stream.take_ready():
+                if isinstance(home, str):
+                    self.dropped += 1
+                    continue
+                if self.replace(home):
+                    count += 1
+                    self._due -= 1
+                if self._due < 1:
+                    break
+        return count
+
+    def replace(self, home: BuiltHome) -> bool:
+        """Put a home in the place of the oldest one whose slot is as large or a little larger.
+
+        Returns:
+            False if there is no such slot; the home is then counted in ``skipped``.
+        """
+        fitting = (self._capacity >= home.cells) & (self._capacity <= _SPARE_ROOM * home.cells)
+        if not fitting.any():
+            self.skipped += 1
+            return False
+        slot = int(np.where(fitting, self._age, np.iinfo(np.int64).max).argmin())
+        self._age[slot] = self._age.max() + 1
+        self._gone.append(self._mesh[slot])
+        self._mesh[slot] = self._build_mesh(home)
+        self._tensors["meshes"][slot] = self._mesh[slot].id
+        self.records[slot] = _record(home)
+        self._write(slot, home)
+        self._tensors["generation"][slot] += 1
+        self.replaced += 1
+        return True
+
+    def generations(self) -> torch.Tensor:
+        """(homes,) int32 on the device: how many homes were in each slot before."""
+        return self._tensors["generation"]
+
+    def save_state(self) -> dict[str, Any]:
+        """Which homes are here, by their seeds."""
+        return {"seeds": [record.seed for record in self.records], "names": [record.name for record in self.records]}
+
+    def holds(self, state: dict[str, Any]) -> bool:
+        """Whether the homes are those of a saved state."""
+        return self.save_state() == state
+
+    def close(self) -> None:
+        """End the processes that build fresh homes."""
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
+
+    def _build_mesh(self, home: BuiltHome) -> wp.Mesh:
+        stream = None
+        if self.device.type == "cuda":  # in order with torch's work, which reads the mesh
+            stream = wp.stream_from_torch(torch.cuda.current_stream(self.device))
+        with wp.ScopedStream(stream):
+            points = wp.array(home.vertices, dtype=wp.vec3, device=self._warp_device)
+            faces = wp.array(home.faces.ravel(), dtype=wp.int32, device=self._warp_device)
+            return wp.Mesh(points=points, indices=faces, bvh_constructor=self._tree)
+
+    def _write(self, slot: int, home: BuiltHome) -> None:
+        tensors, begin, cells = self._tensors, int(self._first[slot]), home.cells
+        if home.goals.shape != tensors["goals"].shape[1:] or home.starts.shape != tensors["starts"].shape[1:]:
+            raise InputError("all homes of a store need as many goals and starts")
+        self._copy(tensors["fields"][begin : begin + cells], home.fields.reshape(cells, -1))
+        self._copy(tensors["clearance"][4 * begin : 4 * (begin + cells)], home.clearance.reshape(-1))
+        self._copy(tensors["goals"][slot], home.goals)
+        self._copy(tensors["starts"][slot], home.starts)
+        self._copy(tensors["shape"][slot], np.array(home.fields.shape[:2], np.int32))
+        self._copy(tensors["origin"][slot], np.array(home.origin, np.float32))
+
+    def _copy(self, target: torch.Tensor, values: np.ndarray) -> None:
+        source = torch.from_numpy(values)
+        if self.device.type == "cuda":
+            source = source.pin_memory()  # otherwise the host waits for what the device has still to do
+        target.copy_(source, non_blocking=True)
+
+
+def _record(home: BuiltHome) -> HomeRecord:
+    return HomeRecord(home.seed, home.name, home.solid, home.blocks, home.goals)

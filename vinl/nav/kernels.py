@@ -1,0 +1,392 @@
+"""The Warp kernels of the navigation environment: one thread a robot, or a pixel. A file of their own: Warp compiles
+these functions, Python never runs them."""
+
+# ruff: noqa: UP018, RUF046 - a variable of a kernel that changes must be made by its type
+# pyright: reportInvalidTypeForm=false, reportCallIssue=false, reportArgumentType=false
+# pyright: reportOperatorIssue=false, reportIndexIssue=false, reportAttributeAccessIssue=false
+
+from typing import no_type_check
+
+import warp as wp
+
+from vinl.sensing.warp_start import start_warp
+
+start_warp()
+wp.set_module_options({"enable_backward": False})
+
+FIELD = wp.constant(wp.float32(0.1))
+"""Side of a cell of the distance fields [m]; the clearance grid has two cells along it."""
+
+NOWHERE = wp.constant(wp.float32(1.0e9))
+"""Stands for a distance that is not known [m]."""
+
+
+@wp.struct
+@no_type_check
+class Homes:
+    """The grids of all homes, one after another; home h begins at cell ``first[h]`` (clearance: four times that)."""
+
+    first: wp.array(dtype=wp.int32)
+    shape: wp.array(dtype=wp.vec2i)
+    origin: wp.array(dtype=wp.vec2)
+    clearance: wp.array(dtype=wp.float16)
+    fields: wp.array(dtype=wp.float16, ndim=2)
+    goals: wp.array(dtype=wp.vec2, ndim=2)
+    starts: wp.array(dtype=wp.vec2, ndim=2)
+    generation: wp.array(dtype=wp.int32)
+    meshes: wp.array(dtype=wp.uint64)
+
+
+@wp.struct
+@no_type_check
+class Robots:
+    """The state of all robots."""
+
+    home: wp.array(dtype=wp.int32)
+    generation: wp.array(dtype=wp.int32)
+    goal: wp.array(dtype=wp.int32)
+    position: wp.array(dtype=wp.vec2)
+    yaw: wp.array(dtype=wp.float32)
+    speed: wp.array(dtype=wp.float32)
+    yaw_rate: wp.array(dtype=wp.float32)
+    distance: wp.array(dtype=wp.float32)
+    gain: wp.array(dtype=wp.vec3)  # of forward speed and yaw rate, and yaw drift
+    mount: wp.array(dtype=wp.vec4)  # roll, pitch, height of this episode's camera, height of the ceiling (0: none)
+
+
+@wp.struct
+@no_type_check
+class Rules:
+    """Numbers of the configuration."""
+
+    length: wp.float32
+    width: wp.float32
+    max_speed: wp.float32
+    max_yaw_rate: wp.float32
+    period: wp.float32
+    success_radius: wp.float32
+    least: wp.float32  # distance at the start
+    most: wp.float32
+    start_speed: wp.vec2
+    lag: wp.float32
+    speed_gain: wp.vec2
+    yaw_gain: wp.vec2
+    speed_noise: wp.float32
+    yaw_noise: wp.float32
+    side_slip: wp.float32
+    yaw_drift: wp.float32
+    tilt_offset: wp.float32
+    tilt_shake: wp.float32
+    tilt_uniform: wp.float32
+    height_offset: wp.float32
+    height_shake: wp.float32
+    with_trunk: wp.int32
+    forward: wp.float32
+    mount_height: wp.float32
+    pitch_down: wp.float32
+    tan_half: wp.vec2
+    far: wp.float32
+    ceiling_share: wp.float32
+    ceiling: wp.vec2
+    noise: wp.float32
+    dropout: wp.float32
+
+
+@wp.func
+@no_type_check
+def read_clearance(homes: Homes, home: wp.int32, p: wp.vec2) -> wp.float32:
+    """Clearance [m] between the cells' centres; 0 off the grid."""
+    rows = 2 * homes.shape[home][0]
+    columns = 2 * homes.shape[home][1]
+    u = 2.0 * (p[0] - homes.origin[home][0]) / FIELD
+    v = 2.0 * (p[1] - homes.origin[home][1]) / FIELD
+    j = wp.int32(wp.floor(u))
+    i = wp.int32(wp.floor(v))
+    if i < 0 or j < 0 or i + 1 >= rows or j + 1 >= columns:
+        return float(0.0)
+    a = v - wp.float32(i)
+    b = u - wp.float32(j)
+    at = 4 * homes.first[home] + i * columns + j
+    low = (1.0 - b) * wp.float32(homes.clearance[at]) + b * wp.float32(homes.clearance[at + 1])
+    at = at + columns
+    high = (1.0 - b) * wp.float32(homes.clearance[at]) + b * wp.float32(homes.clearance[at + 1])
+    return (1.0 - a) * low + a * high
+
+
+@wp.func
+@no_type_check
+def read_distance(homes: Homes, home: wp.int32, goal: wp.int32, p: wp.vec2) -> wp.float32:
+    """Distance to the goal [m], weighted over those of the four cells around that know it; else ``NOWHERE``."""
+    rows = homes.shape[home][0]
+    columns = homes.shape[home][1]
+    u = (p[0] - homes.origin[home][0]) / FIELD
+    v = (p[1] - homes.origin[home][1]) / FIELD
+    j = wp.int32(wp.floor(u))
+    i = wp.int32(wp.floor(v))
+    a = v - wp.float32(i)
+    b = u - wp.float32(j)
+    total = float(0.0)
+    weights = float(0.0)
+    for k in range(4):
+        di = k // 2
+        dj = k % 2
+        if i + di >= 0 and j + dj >= 0 and i + di < rows and j + dj < columns:
+            value = wp.float32(homes.fields[homes.first[home] + (i + di) * columns + j + dj, goal])
+            weight = wp.where(di == 1, a, 1.0 - a) * wp.where(dj == 1, b, 1.0 - b)
+            if wp.isfinite(value) and weight > 1.0e-6:
+                total = total + weight * value
+                weights = weights + weight
+    if weights > 0.0:
+        return total / weights
+    return NOWHERE
+
+
+@wp.func
+@no_type_check
+def touches(homes: Homes, home: wp.int32, p: wp.vec2, yaw: wp.float32, length: wp.float32, width: wp.float32) -> bool:
+    """Whether the robot's rectangle reaches a wall or furniture: five discs along it and one in each corner fill it
+    but for 2 cm at the corners."""
+    half = 0.5 * length
+    radius = 0.5 * width
+    middle = read_clearance(homes, home, p)
+    if middle * middle >= half * half + radius * radius:
+        return False
+    if middle < radius:
+        return True
+    along = wp.vec2(wp.cos(yaw), wp.sin(yaw))
+    side = wp.vec2(-along[1], along[0])
+    reach = half - radius
+    for k in range(2):
+        away = reach * (0.5 + 0.5 * wp.float32(k))
+        if read_clearance(homes, home, p + away * along) < radius:
+            return True
+        if read_clearance(homes, home, p - away * along) < radius:
+            return True
+    corner = 0.32 * radius
+    for k in range(4):
+        u = wp.where(k // 2 == 0, half - corner, corner - half)
+        v = wp.where(k % 2 == 0, radius - corner, corner - radius)
+        if read_clearance(homes, home, p + u * along + v * side) < corner:
+            return True
+    return False
+
+
+@wp.func
+@no_type_check
+def spread_uniform(state: wp.uint32, between: wp.vec2) -> wp.float32:
+    """Uniform within a range."""
+    return between[0] + (between[1] - between[0]) * wp.randf(state)
+
+
+@wp.kernel
+@no_type_check
+def move_robots(
+    homes: Homes,
+    rules: Rules,
+    seed: wp.array(dtype=wp.int32),
+    action: wp.array(dtype=wp.vec2),
+    robots: Robots,
+    moved: wp.array(dtype=wp.float32),
+    blocked: wp.array(dtype=wp.float32),
+    straight: wp.array(dtype=wp.float32),
+):
+    """One step: constant speed, slip and yaw rate over the period; cancelled as a whole if the swept rectangle touches.
+
+    Writes pose, velocity and distance of the robots, the way moved [m], 1 where cancelled, and the straight distance
+    to the goal [m]. Where the goal cannot be reached from the new place, the distance stays as it was.
+    """
+    n = wp.tid()
+    state = wp.rand_init(seed[0] + 4 * seed[1], n)
+    home = robots.home[n]
+    gain = robots.gain[n]
+    a0 = wp.clamp(action[n][0], -1.0, 1.0)
+    a1 = wp.clamp(action[n][1], -1.0, 1.0)
+    v_told = 0.5 * (a0 + 1.0) * rules.max_speed * gain[0]
+    w_told = a1 * rules.max_yaw_rate * gain[1]
+    # a first-order lag: the mean over the period, and what is left of the old velocity at its end
+    mean = float(0.0)
+    last = float(0.0)
+    if rules.lag > 0.0:
+        last = wp.exp(-rules.period / rules.lag)
+        mean = (1.0 - last) * rules.lag / rules.period
+    v = v_told + (robots.speed[n] - v_told) * mean
+    w = w_told + (robots.yaw_rate[n] - w_told) * mean
+    v_end = v_told + (robots.speed[n] - v_told) * last
+    w_end = w_told + (robots.yaw_rate[n] - w_told) * last
+    pace = v / rules.max_speed
+    v = wp.max(v + rules.speed_noise * wp.randn(state) * pace, 0.0)
+    slip = rules.side_slip * wp.randn(state) * pace
+    turning = 0.5 + 0.5 * wp.min(wp.max(pace, wp.abs(w) / rules.max_yaw_rate), 1.0)
+    w = w + gain[2] * pace + rules.yaw_noise * wp.randn(state) * turning
+
+    start = robots.position[n]
+    yaw = robots.yaw[n]
+    # sub-poses at most 5 cm and 6 degrees apart
+    swept = wp.max(wp.sqrt(v * v + slip * slip) / 0.05, wp.abs(w) / 0.1) * rules.period
+    steps = wp.max(wp.int32(wp.ceil(swept)), 1)
+    hit = bool(False)
+    p = start
+    heading = yaw
+    k = int(1)
+    while k <= steps and not hit:
+        t = rules.period * wp.float32(k) / wp.float32(steps)
+        half_turn = 0.5 * w * t
+        chord = t
+        if wp.abs(half_turn) > 1.0e-4:
+            chord = t * wp.sin(half_turn) / half_turn
+        c = wp.cos(yaw + half_turn)
+        s = wp.sin(yaw + half_turn)
+        p = start + chord * wp.vec2(v * c - slip * s, v * s + slip * c)
+        heading = yaw + w * t
+        hit = touches(homes, home, p, heading, rules.length, rules.width)
+        k = k + 1
+    moved[n] = wp.sqrt(v * v + slip * slip) * rules.period
+    blocked[n] = 0.0
+    if hit:
+        p = start
+        heading = yaw
+        v_end = 0.0
+        w_end = 0.0
+        moved[n] = 0.0
+        blocked[n] = 1.0
+    robots.position[n] = p
+    robots.yaw[n] = wp.atan2(wp.sin(heading), wp.cos(heading))
+    robots.speed[n] = v_end
+    robots.yaw_rate[n] = w_end
+    distance = read_distance(homes, home, robots.goal[n], p)
+    if distance < NOWHERE:
+        robots.distance[n] = distance
+    straight[n] = wp.length(homes.goals[home, robots.goal[n]] - p)
+
+
+@wp.kernel
+@no_type_check
+def place_robots(
+    homes: Homes,
+    rules: Rules,
+    seed: wp.array(dtype=wp.int32),
+    chosen: wp.array(dtype=wp.bool),
+    robots: Robots,
+    unplaced: wp.array(dtype=wp.float32),
+):
+    """Start episodes of the chosen robots: random home, goal, start and heading until the distance lies in its range
+    and the robot touches nothing; after many tries any start that leads to its goal."""
+    n = wp.tid()
+    if not chosen[n]:
+        return
+    state = wp.rand_init(seed[0] + 4 * seed[1] + 1, n)
+    tries = int(0)
+    found = bool(False)
+    while not found:
+        home = wp.randi(state, 0, homes.goals.shape[0])
+        goal = wp.randi(state, 0, homes.goals.shape[1])
+        p = homes.starts[home, wp.randi(state, 0, homes.starts.shape[1])]
+        if tries < 128:  # later: the cells' centres, which are on the ways
+            p = p + FIELD * wp.vec2(wp.randf(state) - 0.5, wp.randf(state) - 0.5)
+        yaw = 6.2831853 * wp.randf(state) - 3.1415926
+        distance = read_distance(homes, home, goal, p)
+        # a start within the goal's radius would be no episode, whatever the range says
+        far = distance < NOWHERE and wp.length(homes.goals[home, goal] - p) > rules.success_radius
+        ranged = distance >= rules.least and distance <= rules.most
+        free = far and not touches(homes, home, p, yaw, rules.length, rules.width)
+        tries = tries + 1
+        found = (ranged and free) or (tries >= 256 and free) or (tries >= 512 and far) or tries >= 1024
+        if found:
+            robots.home[n] = home
+            robots.generation[n] = homes.generation[home]
+            robots.goal[n] = goal
+            robots.position[n] = p
+            robots.yaw[n] = yaw
+            robots.distance[n] = distance
+            if not (ranged and free):
+                unplaced[n] = unplaced[n] + 1.0
+    robots.speed[n] = spread_uniform(state, rules.start_speed)
+    robots.yaw_rate[n] = 0.0
+    drift = rules.yaw_drift * (2.0 * wp.randf(state) - 1.0)
+    robots.gain[n] = wp.vec3(spread_uniform(state, rules.speed_gain), spread_uniform(state, rules.yaw_gain), drift)
+    roll = rules.tilt_offset * (2.0 * wp.randf(state) - 1.0)
+    pitch = rules.tilt_offset * (2.0 * wp.randf(state) - 1.0)
+    height = rules.height_offset * (2.0 * wp.randf(state) - 1.0)
+    ceiling = float(0.0)
+    if wp.randf(state) < rules.ceiling_share:
+        ceiling = spread_uniform(state, rules.ceiling)
+    robots.mount[n] = wp.vec4(roll, pitch, height, ceiling)
+
+
+@wp.kernel
+@no_type_check
+def aim_cameras(
+    rules: Rules,
+    seed: wp.array(dtype=wp.int32),
+    robots: Robots,
+    position: wp.array(dtype=wp.vec3),
+    rotation: wp.array(dtype=wp.mat33),
+    holes: wp.array(dtype=wp.float32),
+):
+    """Where each camera is and where it looks in this step; the share of its pixels that read as the far limit."""
+    n = wp.tid()
+    state = wp.rand_init(seed[0] + 4 * seed[1] + 2, n)
+    mount = robots.mount[n]
+    roll = mount[0] + rules.tilt_shake * wp.randn(state) + rules.tilt_uniform * (2.0 * wp.randf(state) - 1.0)
+    pitch = mount[1] + rules.tilt_shake * wp.randn(state) + rules.tilt_uniform * (2.0 * wp.randf(state) - 1.0)
+    height = rules.mount_height + mount[2] + rules.height_shake * wp.randn(state)
+    yaw = robots.yaw[n]
+    cy = wp.cos(yaw)
+    sy = wp.sin(yaw)
+    cp = wp.cos(pitch)
+    sp = wp.sin(pitch)
+    cr = wp.cos(roll)
+    sr = wp.sin(roll)
+    turn = wp.mat33(cy, -sy, 0.0, sy, cy, 0.0, 0.0, 0.0, 1.0)
+    tilt = wp.mat33(cp, 0.0, sp, 0.0, 1.0, 0.0, -sp, 0.0, cp) * wp.mat33(1.0, 0.0, 0.0, 0.0, cr, -sr, 0.0, sr, cr)
+    cd = wp.cos(rules.pitch_down)
+    sd = wp.sin(rules.pitch_down)
+    rest = wp.mat33(cd, 0.0, sd, 0.0, 1.0, 0.0, -sd, 0.0, cd)
+    ahead = wp.vec3(rules.forward, 0.0, 0.0)
+    if rules.with_trunk != 0:
+        rotation[n] = turn * tilt * rest
+        ahead = turn * tilt * ahead
+    else:
+        # the camera turns about itself: roll about its own axis, pitch about its own side
+        rotation[n] = turn * rest * tilt
+        ahead = turn * ahead
+    p = robots.position[n]
+    position[n] = wp.vec3(p[0] + ahead[0], p[1] + ahead[1], wp.max(height + ahead[2], 0.05))
+    holes[n] = rules.dropout * wp.randf(state)
+
+
+@wp.kernel
+@no_type_check
+def render_interior(
+    homes: Homes,
+    rules: Rules,
+    seed: wp.array(dtype=wp.int32),
+    robots: Robots,
+    position: wp.array(dtype=wp.vec3),
+    rotation: wp.array(dtype=wp.mat33),
+    holes: wp.array(dtype=wp.float32),
+    depth: wp.array(dtype=wp.float16, ndim=3),
+):
+    """Depth along the optical axis as a share of the far limit, one thread a pixel. Floor and ceiling are planes: no
+    rays are lost on them, and none leaves a home through its floor."""
+    n, row, column = wp.tid()
+    left = rules.tan_half[0] * (1.0 - (2.0 * wp.float32(column) + 1.0) / wp.float32(depth.shape[2]))
+    up = rules.tan_half[1] * (1.0 - (2.0 * wp.float32(row) + 1.0) / wp.float32(depth.shape[1]))
+    direction = rotation[n] * wp.vec3(1.0, left, up)
+    origin = position[n]
+    far = rules.far
+    if direction[2] < -1.0e-6:
+        far = wp.min(far, -origin[2] / direction[2])
+    ceiling = robots.mount[n][3]
+    if direction[2] > 1.0e-6 and ceiling > 0.0:
+        far = wp.min(far, wp.max(ceiling - origin[2], 0.0) / direction[2])
+    hit = wp.mesh_query_ray(homes.meshes[robots.home[n]], origin, direction, far)
+    if hit.result:
+        far = wp.min(hit.t, far)
+    if rules.noise > 0.0 or rules.dropout > 0.0:
+        pixel = (n * depth.shape[1] + row) * depth.shape[2] + column
+        state = wp.rand_init(seed[0] + 4 * seed[1] + 3, pixel)
+        if wp.randf(state) < holes[n]:
+            far = rules.far
+        far = wp.clamp(far * (1.0 + rules.noise * wp.randn(state)), 0.0, rules.far)
+    depth[n, row, column] = wp.float16(far / rules.far)
