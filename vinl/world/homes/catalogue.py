@@ -7,10 +7,25 @@ stands on legs is open below, as a camera close to the floor sees it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import wraps
 from random import Random
 
 Part = tuple[float, float, float, float, float, float, float]
 """u, v of the middle, turn [rad], length along u, width along v, bottom, top [m]."""
+
+Things = list[list[Part]]
+"""What stands together, thing by thing: a table and its chairs. Any thing but the first can be taken away."""
+
+
+def _alone(draw: Callable[[Random], list[Part]]) -> Callable[[Random], Things]:
+    """For a thing that stands with nothing else."""
+
+    @wraps(draw)
+    def draw_alone(rng: Random) -> Things:
+        return [draw(rng)]
+
+    return draw_alone
 
 
 def _slab(u0: float, u1: float, v0: float, v1: float, bottom: float, top: float) -> Part:
@@ -50,12 +65,13 @@ def chair(rng: Random) -> list[Part]:
     return parts + _legs(-0.21, 0.21, 0.21, seat - 0.05, 0.035)
 
 
-def table_with_chairs(rng: Random, length: float, width: float) -> list[Part]:
+def table_with_chairs(rng: Random, length: float, width: float) -> Things:
     """A table on four legs, its length across, centred on the origin, with chairs on both sides, some pulled out."""
     top = rng.uniform(0.72, 0.77)
     parts = [(0.0, 0.0, 0.0, width, length, top - 0.04, top), *_legs(-width / 2, width / 2, length / 2, top - 0.04)]
     if rng.random() < 0.12:
         parts = [parts[0], (0.0, 0.0, 0.0, 0.14, 0.14, 0.0, top - 0.04), (0.0, 0.0, 0.0, 0.5, 0.6, 0.0, 0.05)]
+    things = [parts]
     n = max(int(length / 0.62), 1)
     for k in range(n):
         for side in (1, -1):
@@ -63,25 +79,46 @@ def table_with_chairs(rng: Random, length: float, width: float) -> list[Part]:
                 continue
             out = rng.uniform(0.3, 0.5) if rng.random() < 0.15 else rng.uniform(0.02, 0.15)
             turn = (math.pi if side > 0 else 0.0) + rng.gauss(0.0, 0.12)
-            parts += move(chair(rng), side * (width / 2 + out), ((k + 0.5) / n - 0.5) * length, turn)
+            things.append(move(chair(rng), side * (width / 2 + out), ((k + 0.5) / n - 0.5) * length, turn))
     if length > 1.3 and rng.random() < 0.4:
-        for side in (1, -1):
-            parts += move(chair(rng), 0.0, side * (length / 2 + 0.1), -side * math.pi / 2)
-    return parts
+        things += [move(chair(rng), 0.0, side * (length / 2 + 0.1), -side * math.pi / 2) for side in (1, -1)]
+    return things
 
 
-def bed(rng: Random, wide: bool) -> list[Part]:
+def dining_table(rng: Random) -> Things:
+    """A table for four to eight."""
+    return table_with_chairs(rng, rng.uniform(1.3, 2.3), rng.uniform(0.75, 1.05))
+
+
+def table_for_two(rng: Random) -> Things:
+    """A small table with two to four chairs."""
+    return table_with_chairs(rng, rng.uniform(0.7, 1.2), rng.uniform(0.65, 0.8))
+
+
+def double_bed(rng: Random) -> Things:
+    """A bed for two, its head at the wall, at times with bedside tables."""
+    return bed(rng, True)
+
+
+def single_bed(rng: Random) -> Things:
+    """A bed for one."""
+    return bed(rng, False)
+
+
+def bed(rng: Random, wide: bool) -> Things:
+    """A bed, its head at the wall, at times with bedside tables."""
     width, length = (rng.uniform(1.35, 1.85), rng.uniform(1.95, 2.15)) if wide else (rng.uniform(0.8, 1.1), 2.0)
     top, h = rng.uniform(0.4, 0.6), width / 2
     bottom = 0.0 if rng.random() < 0.5 else rng.uniform(0.12, 0.25)
     parts = [_centred(length, width, bottom, top), _centred(0.06, width, 0.0, rng.uniform(0.8, 1.2))]
     if bottom:
         parts += _legs(0.0, length, h, bottom, 0.07)
+    things = [parts]
     if rng.random() < 0.8:
         for side in (1, -1) if wide else (rng.choice((1, -1)),):
             size, gap = rng.uniform(0.35, 0.5), rng.uniform(0.03, 0.1)
-            parts.append((size / 2, side * (h + gap + size / 2), 0.0, size, size, 0.0, rng.uniform(0.4, 0.6)))
-    return parts
+            things.append([(size / 2, side * (h + gap + size / 2), 0.0, size, size, 0.0, rng.uniform(0.4, 0.6))])
+    return things
 
 
 def sofa(rng: Random, length: float | None = None) -> list[Part]:
@@ -106,7 +143,7 @@ def low_table(rng: Random) -> list[Part]:
     return [_centred(width, length, top - 0.05, top), *_legs(0.0, width, length / 2, top - 0.05)]
 
 
-def sofa_group(rng: Random) -> list[Part]:
+def sofa_group(rng: Random) -> Things:
     """A sofa, a low table before it, at times a corner piece or an armchair."""
     length = rng.uniform(1.6, 2.6)
     parts = sofa(rng, length)
@@ -114,28 +151,33 @@ def sofa_group(rng: Random) -> list[Part]:
         side = rng.choice((1, -1))
         parts.append(_between(0.9, 1.65, side * (length / 2 - 0.85), side * length / 2, 0.0, 0.43))
     if rng.random() < 0.8:
-        parts += move(low_table(rng), rng.uniform(1.25, 1.5), 0.0)
-    return parts
+        return [parts, move(low_table(rng), rng.uniform(1.25, 1.5), 0.0)]
+    return [parts]
 
 
+@_alone
 def armchair(rng: Random) -> list[Part]:
     return sofa(rng, rng.uniform(0.75, 0.95))
 
 
+@_alone
 def wardrobe(rng: Random) -> list[Part]:
     return [_centred(rng.uniform(0.55, 0.65), rng.uniform(0.9, 2.6), 0.0, rng.uniform(1.9, 2.2))]
 
 
+@_alone
 def shelf(rng: Random) -> list[Part]:
     width, depth = rng.uniform(0.5, 2.0), rng.uniform(0.25, 0.42)
     top = rng.uniform(1.6, 2.2) if rng.random() < 0.65 else rng.uniform(0.7, 1.2)
     return [_centred(depth, width, 0.0, top)]
 
 
+@_alone
 def chest(rng: Random) -> list[Part]:
     return [_centred(rng.uniform(0.38, 0.52), rng.uniform(0.6, 1.5), 0.0, rng.uniform(0.7, 1.1))]
 
 
+@_alone
 def television(rng: Random) -> list[Part]:
     """A low board with a screen on it."""
     width, depth, top = rng.uniform(1.1, 2.0), rng.uniform(0.35, 0.5), rng.uniform(0.4, 0.6)
@@ -147,7 +189,7 @@ def television(rng: Random) -> list[Part]:
     return parts
 
 
-def desk(rng: Random) -> list[Part]:
+def desk(rng: Random) -> Things:
     width, depth, top = rng.uniform(1.0, 1.7), rng.uniform(0.55, 0.8), rng.uniform(0.71, 0.76)
     h = width / 2
     parts = [_centred(depth, width, top - 0.04, top)]
@@ -157,15 +199,27 @@ def desk(rng: Random) -> list[Part]:
         side = rng.choice((1, -1))
         parts.append(_between(0.05, depth - 0.05, side * (h - 0.42), side * h, 0.0, top - 0.04))
         parts.append(_between(0.05, depth - 0.05, -side * (h - 0.03), -side * h, 0.0, top - 0.04))
-    if rng.random() < 0.85:
-        parts += move(
-            chair(rng), depth + rng.uniform(0.0, 0.3), rng.uniform(-0.15, 0.15), math.pi + rng.gauss(0.0, 0.3)
-        )
-    return parts
+    if rng.random() > 0.85:
+        return [parts]
+    out, aside = depth + rng.uniform(0.0, 0.3), rng.uniform(-0.15, 0.15)
+    return [parts, move(chair(rng), out, aside, math.pi + rng.gauss(0.0, 0.3))]
 
 
-def counter(rng: Random, width: float) -> list[Part]:
+def short_counter(rng: Random) -> Things:
+    """The second run of a kitchen."""
+    return counter(rng, rng.uniform(1.2, 2.2))
+
+
+@_alone
+def pillar(rng: Random) -> list[Part]:
+    """A column up to the ceiling."""
+    side = rng.uniform(0.25, 0.45)
+    return [_centred(side, side, 0.0, 2.3)]
+
+
+def counter(rng: Random, width: float | None = None) -> Things:
     """A kitchen run: units 0.6 m deep, at times a fridge at one end, and cupboards on the wall above."""
+    width = width or rng.uniform(1.8, 3.6)
     h, top = width / 2, rng.uniform(0.86, 0.94)
     low, high, parts = -h, h, []
     if width > 1.7 and rng.random() < 0.7:
@@ -175,27 +229,28 @@ def counter(rng: Random, width: float) -> list[Part]:
     parts.append(_slab(0.0, 0.6, low, high, 0.0, top))
     if rng.random() < 0.75:
         parts.append(_slab(0.0, 0.35, low, high, 1.4, 2.1))
-    return parts
+    return [parts]
 
 
-def island(rng: Random) -> list[Part]:
+def island(rng: Random) -> Things:
     """A free-standing kitchen block, centred on the origin, at times with stools."""
     width, depth = rng.uniform(1.2, 2.2), rng.uniform(0.65, 1.0)
-    parts: list[Part] = [(0.0, 0.0, 0.0, depth, width, 0.0, rng.uniform(0.88, 0.95))]
+    things: Things = [[(0.0, 0.0, 0.0, depth, width, 0.0, rng.uniform(0.88, 0.95))]]
     if rng.random() < 0.6:
         n = int(width / 0.55)
         for k in range(n):
             v = ((k + 0.5) / n - 0.5) * width
-            parts += move(
-                [(0.0, 0.0, 0.0, 0.36, 0.36, 0.62, 0.66), *_legs(-0.17, 0.17, 0.17, 0.62, 0.035)], depth / 2 + 0.2, v
-            )
-    return parts
+            stool = [(0.0, 0.0, 0.0, 0.36, 0.36, 0.62, 0.66), *_legs(-0.17, 0.17, 0.17, 0.62, 0.035)]
+            things.append(move(stool, depth / 2 + 0.2, v))
+    return things
 
 
+@_alone
 def toilet(rng: Random) -> list[Part]:
     return [_slab(0.0, 0.18, -0.19, 0.19, 0.0, rng.uniform(0.75, 1.0)), _slab(0.18, 0.66, -0.18, 0.18, 0.0, 0.42)]
 
 
+@_alone
 def basin(rng: Random) -> list[Part]:
     """A wash-stand on the floor, or a basin on a column."""
     if rng.random() < 0.5:
@@ -203,11 +258,13 @@ def basin(rng: Random) -> list[Part]:
     return [_centred(0.45, 0.55, 0.68, 0.86), _slab(0.1, 0.3, -0.09, 0.09, 0.0, 0.68)]
 
 
+@_alone
 def bath(rng: Random) -> list[Part]:
     """A bath; its long side lies at the wall."""
     return [_centred(rng.uniform(0.7, 0.8), rng.uniform(1.5, 1.8), 0.0, rng.uniform(0.5, 0.62))]
 
 
+@_alone
 def shower(rng: Random) -> list[Part]:
     """A tray too high for the robot, with glass on two sides."""
     side = rng.uniform(0.8, 1.0)
@@ -215,14 +272,17 @@ def shower(rng: Random) -> list[Part]:
     return [_centred(side, side, 0.0, 0.3), _slab(side - 0.03, side, -h, h, 0.3, 2.0)]
 
 
+@_alone
 def washer(rng: Random) -> list[Part]:
     return [_centred(0.6, 0.6, 0.0, 0.85)]
 
 
+@_alone
 def shoe_rack(rng: Random) -> list[Part]:
     return [_centred(rng.uniform(0.2, 0.36), rng.uniform(0.6, 1.2), 0.0, rng.uniform(0.45, 1.1))]
 
 
+@_alone
 def stand(rng: Random) -> list[Part]:
     """Something small: a plant in its pot, a basket, a box, a stool, a floor lamp."""
     kind = rng.randrange(5)
@@ -242,6 +302,7 @@ def stand(rng: Random) -> list[Part]:
     return [_centred(rng.uniform(0.4, 0.6), rng.uniform(0.4, 0.7), 0.0, rng.uniform(0.35, 0.95))]
 
 
+@_alone
 def side_table(rng: Random) -> list[Part]:
     size, top = rng.uniform(0.35, 0.6), rng.uniform(0.45, 0.65)
     return [_centred(size, size, top - 0.04, top), *_legs(0.0, size, size / 2, top - 0.04, 0.04)]

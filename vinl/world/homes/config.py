@@ -57,7 +57,7 @@ class HomeConfig:
     loft_share: float = 0.12
     passage_share: float = 0.3
     loop_share: float = 0.3
-    furniture_density: tuple[float, float] = (0.3, 1.3)
+    furniture_density: tuple[float, float] = (0.4, 1.7)
     bare_share: float = 0.06
     askew_share: float = 0.1
 

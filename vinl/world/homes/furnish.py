@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from random import Random
 
 from vinl.world.homes import catalogue as make
 from vinl.world.homes.catalogue import Part
 from vinl.world.homes.config import HomeConfig
-from vinl.world.homes.rooms import Rect, Room
+from vinl.world.homes.rooms import Rect
 from vinl.world.homes.walls import Row, Shell
+from vinl.world.homes.wishes import Maker, draw_wishes
 
-TRIES = 6
+TRIES = 10
 """Places tried for a piece before it is left out."""
-
-Maker = Callable[[Random], list[Part]]
 
 
 @dataclass
 class Piece:
-    """A piece of furniture, or a group that belongs together (a table and its chairs), in its place.
+    """A piece of furniture in its place.
 
     Attributes:
         room: number of its room.
         rows: its boxes.
+        chief: false for what stands with something else: chairs at a table, tables beside a bed.
     """
 
     room: int
     rows: list[Row]
+    chief: bool = True
 
 
 @dataclass
@@ -66,15 +66,16 @@ def furnish(rng: Random, shell: Shell, config: HomeConfig) -> list[Piece]:
     for k, room in enumerate(shell.rooms):
         floor = _find_floor(shell, k)
         local = density * rng.uniform(0.6, 1.3)
-        for maker, wish, where in _wish(rng, room):
+        for maker, wish, where in draw_wishes(rng, room):
             # each wish is fulfilled by chance; above a density of 1 some are fulfilled twice
             count = int(local * wish) + (rng.random() < (local * wish) % 1.0) if wish < 1.0 else 1
-            if wish >= 1.0 and local < 0.5 and rng.random() > 0.4 + local:
+            if wish >= 1.0 and rng.random() > 0.5 + local:
                 continue
             for _ in range(count):
-                rows = _place(rng, floor, maker, where, config.askew_share)
-                if rows:
-                    pieces.append(Piece(k, rows))
+                things = _place(rng, floor, maker, where, config.askew_share)
+                if not things and wish >= 1.0:  # another size may fit
+                    things = _place(rng, floor, maker, "wall", 0.0)
+                pieces += [Piece(k, rows, n == 0) for n, rows in enumerate(things)]
     return pieces
 
 
@@ -113,121 +114,18 @@ def _find_floor(shell: Shell, room: int) -> Floor:
     return Floor(rects, faces, list(shell.clear[room]))
 
 
-def _wish(rng: Random, room: Room) -> list[tuple[Maker, float, str]]:
-    """What belongs into a room: how it is made, how likely it is at density 1, and where it stands."""
-    area = room.area
-    kind = room.kind
-    long = lambda least, most: rng.uniform(least, most)  # noqa: E731
-    wishes: list[tuple[Maker, float, str]] = []
-    if kind == "bedroom":
-        wishes = [
-            (lambda r: make.bed(r, area > 8.5), 1.0, "middle" if area > 10 else "wall"),
-            (make.wardrobe, 0.95, "corner"),
-            (make.desk, 0.35, "wall"),
-            (make.chest, 0.5, "wall"),
-            (make.shelf, 0.3, "wall"),
-            (make.armchair, 0.15, "corner"),
-        ]
-    elif kind == "child":
-        wishes = [
-            (lambda r: make.bed(r, False), 1.0, "corner"),
-            (make.desk, 0.8, "wall"),
-            (make.wardrobe, 0.6, "corner"),
-            (make.shelf, 0.7, "wall"),
-            (lambda r: make.bed(r, False), 0.3, "corner"),
-            (make.stand, 0.6, "floor"),
-        ]
-    elif kind in ("living", "studio"):
-        wishes = [(make.sofa_group, 1.0, "free" if area > 28 and rng.random() < 0.4 else "middle")]
-        if kind == "studio" or (area > 30 and rng.random() < 0.3):
-            width = long(2.0, 3.6)
-            wishes.append((lambda r: make.counter(r, width), 1.0, "corner"))
-            if area > 32:
-                wishes.append((make.island, 0.5, "floor"))
-        if kind == "studio" or area > 20:
-            wishes.append(
-                (lambda r: make.table_with_chairs(r, r.uniform(1.2, 2.0), r.uniform(0.75, 1.0)), 0.85, "floor")
-            )
-        wishes += [
-            (make.television, 0.8, "middle"),
-            (make.shelf, 0.8, "wall"),
-            (make.armchair, 0.6, "corner"),
-            (make.side_table, 0.3, "corner"),
-            (make.chest, 0.4, "wall"),
-        ]
-        for _ in range(int(area / 18)):
-            wishes += [(make.shelf, 0.4, "wall"), (make.armchair, 0.4, "floor"), (make.stand, 0.5, "floor")]
-        if area > 45:
-            wishes += [(make.sofa_group, 0.6, "free"), (make.desk, 0.5, "wall"), (make.chest, 0.5, "wall")]
-    elif kind == "kitchen":
-        width, second = long(1.8, 3.6), long(1.2, 2.4)
-        wishes = [
-            (lambda r: make.counter(r, width), 1.0, "corner"),
-            (lambda r: make.counter(r, second), 0.6, "corner"),
-            (
-                lambda r: make.table_with_chairs(r, r.uniform(0.8, 1.4), r.uniform(0.7, 0.85)),
-                0.8 if area > 9 else 0.3,
-                "floor",
-            ),
-            (make.shelf, 0.2, "wall"),
-        ]
-        if area > 18:
-            wishes.insert(2, (make.island, 0.5, "floor"))
-    elif kind == "dining":
-        wishes = [
-            (lambda r: make.table_with_chairs(r, r.uniform(1.4, 2.4), r.uniform(0.8, 1.05)), 1.0, "floor"),
-            (make.chest, 0.8, "wall"),
-            (make.shelf, 0.4, "wall"),
-        ]
-    elif kind == "bath":
-        wet = make.bath if area > 4.0 and rng.random() < 0.6 else make.shower
-        wishes = [
-            (wet, 1.0, "corner"),
-            (make.toilet, 0.95, "wall"),
-            (make.basin, 0.95, "wall"),
-            (make.washer, 0.4, "corner"),
-        ]
-    elif kind == "wc":
-        wishes = [(make.toilet, 1.0, "wall"), (make.basin, 0.8, "wall")]
-    elif kind == "store":
-        wishes = [
-            (make.shelf, 0.9, "wall"),
-            (make.shelf, 0.7, "wall"),
-            (make.washer, 0.4, "corner"),
-            (make.stand, 0.7, "floor"),
-        ]
-    elif kind == "office":
-        wishes = [
-            (make.desk, 1.0, "wall"),
-            (make.shelf, 0.9, "wall"),
-            (make.shelf, 0.7, "wall"),
-            (make.armchair, 0.4, "corner"),
-        ]
-    elif kind == "hall":
-        wishes = [
-            (make.shoe_rack, 0.7, "wall"),
-            (make.shoe_rack, 0.3, "wall"),
-            (make.chest, 0.2 if area > 9 else 0.0, "wall"),
-        ]
-    if kind not in ("wc", "bath"):
-        wishes += [(make.stand, 0.5, "corner")] + [(make.stand, 0.3, "floor")] * int(area / 12)
-    return wishes
-
-
-def _place(rng: Random, floor: Floor, maker: Maker, where: str, askew: float) -> list[Row]:
-    """Try places until the piece stands on free floor; nothing if there is none."""
-    parts = maker(rng)
-    u0 = min(u - (abs(math.cos(t)) * a + abs(math.sin(t)) * b) / 2 for u, _, t, a, b, _, _ in parts)
-    u1 = max(u + (abs(math.cos(t)) * a + abs(math.sin(t)) * b) / 2 for u, _, t, a, b, _, _ in parts)
-    v0 = min(v - (abs(math.sin(t)) * a + abs(math.cos(t)) * b) / 2 for _, v, t, a, b, _, _ in parts)
-    v1 = max(v + (abs(math.sin(t)) * a + abs(math.cos(t)) * b) / 2 for _, v, t, a, b, _, _ in parts)
-    # from here on the piece stands on the middle of its bounding rectangle
-    parts = make.move(parts, -(u0 + u1) / 2, -(v0 + v1) / 2)
+def _place(rng: Random, floor: Floor, maker: Maker, where: str, askew: float) -> list[list[Row]]:
+    """Try places until the things stand on free floor; nothing if there is none."""
+    things = maker(rng)
+    u0, u1, v0, v1 = _measure([part for parts in things for part in parts])
+    u, v = (u0 + u1) / 2, (v0 + v1) / 2
     depth, width = u1 - u0, v1 - v0
     out_of_place = rng.random() < askew
-    if out_of_place and where != "floor" and depth * width < 1.6:
+    if out_of_place and depth * width < 1.6:
         where = "floor"
-    for _ in range(TRIES):
+    for attempt in range(TRIES):
+        if attempt == TRIES // 2 and where in ("middle", "free", "corner"):
+            where = "wall"
         spot = _find_spot(rng, floor, depth, width, where)
         if spot is None:
             continue
@@ -235,31 +133,44 @@ def _place(rng: Random, floor: Floor, maker: Maker, where: str, askew: float) ->
         turn = 0.0
         if where == "floor" and (out_of_place or rng.random() < 0.15):
             turn = rng.uniform(-math.pi, math.pi)
-        elif where in ("floor", "free") and rng.random() < 0.4:
+        elif where in ("floor", "centre", "free") and rng.random() < 0.4:
             turn = rng.gauss(0.0, 0.08)
         rect = _reach(x, y, facing, depth, width, turn)
         if not _fits(rect, floor, 0.04 if where in ("wall", "corner", "middle") else 0.1):
             continue
         floor.taken.append(rect)
-        return _stand(parts, x, y, facing, turn)
+        # what is drawn stands on the middle of the rectangle around it
+        return [_stand(make.move(parts, -u, -v), x, y, facing, turn) for parts in things]
     return []
+
+
+def _measure(parts: list[Part]) -> tuple[float, float, float, float]:
+    """Least and largest u, then v, that the parts reach to [m]."""
+    reach = []
+    for u, v, turn, length, width, _, _ in parts:
+        c, s = abs(math.cos(turn)) / 2, abs(math.sin(turn)) / 2
+        a, b = c * length + s * width, s * length + c * width
+        reach.append((u - a, u + a, v - b, v + b))
+    u0, u1, v0, v1 = zip(*reach, strict=True)
+    return min(u0), max(u1), min(v0), max(v1)
 
 
 def _find_spot(rng: Random, floor: Floor, depth: float, width: float, where: str) -> tuple[float, float, int] | None:
     """Middle of the piece [m] and the quarter it faces (0: +x, 1: +y, 2: -x, 3: -y)."""
-    if where == "floor":
+    if where in ("floor", "centre"):
         x0, y0, x1, y1 = floor.rects[rng.randrange(len(floor.rects))]
         facing = rng.randrange(4)
         a, b = (depth, width) if facing % 2 == 0 else (width, depth)
         if x1 - x0 < a + 0.1 or y1 - y0 < b + 0.1:
             return None
+        if where == "centre" and rng.random() < 0.8:
+            return (x0 + x1) / 2 + rng.gauss(0.0, 0.25), (y0 + y1) / 2 + rng.gauss(0.0, 0.25), facing
         return rng.uniform(x0 + a / 2, x1 - a / 2), rng.uniform(y0 + b / 2, y1 - b / 2), facing
-    if not floor.faces:
+    faces = [face for face in floor.faces if face.high - face.low >= width + 0.02]
+    if not faces:
         return None
-    face = floor.faces[rng.randrange(len(floor.faces))]
+    face = faces[rng.randrange(len(faces))]
     spare = face.high - face.low - width
-    if spare < 0.02:
-        return None
     if where == "corner":
         along = 0.01 if rng.random() < 0.5 else spare - 0.01
     elif where == "middle" and rng.random() < 0.7:

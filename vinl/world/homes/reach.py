@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Bool
-from scipy.ndimage import find_objects
+from scipy.ndimage import distance_transform_edt
 
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import BODY_HEIGHT, measure_clearance
@@ -20,7 +20,11 @@ CHECKED_AT = 0.1
 POCKET = 0.25
 """Floor cut off from the rest that is let be [m2]: the spot behind an open bedside."""
 
+BETWEEN = 0.6
+"""A piece with cells nearer than this to two regions lies between them [m]."""
+
 ROUNDS = 12
+"""Pieces are taken away so many times at most; then the home is left bare."""
 
 
 def keep_connected(
@@ -55,15 +59,19 @@ def keep_connected(
         sizes = np.bincount(regions.ravel())
         sizes[0] = 0
         main = int(sizes.argmax())
-        gone: set[int] = set()
-        for number, where in enumerate(find_objects(regions), start=1):
-            if number != main and sizes[number] * frame.resolution**2 >= POCKET:
-                gone |= _blame(where, masks, kept)
         reached = {owner for owner, where in zip(owners, windows, strict=True) if (regions[where] == main).any()}
         lost = set(range(len(rooms))) - reached
+        bad = {int(k) for k in np.flatnonzero(sizes * frame.resolution**2 >= POCKET)} - {main}
+        gone: set[int] = set()
         for room in lost:
             inner = [k for k in kept if pieces[k].room == room]
-            gone |= set(inner) if attempt >= ROUNDS // 2 else set(inner[-1:])
+            parts = [regions[where] for owner, where in zip(owners, windows, strict=True) if owner == room]
+            islands = {int(k) for part in parts for k in np.unique(part[part > 0])}
+            bad |= islands
+            if attempt >= ROUNDS // 2 or not islands:
+                gone |= set(inner) if attempt >= ROUNDS // 2 else set(inner[-1:])
+        if bad:
+            gone |= _blame(regions, main, bad, masks, kept, pieces)
         if not gone:
             return None if lost else [pieces[k] for k in sorted(kept)]
         kept -= gone
@@ -103,20 +111,19 @@ def _paint_low(piece: Piece, frame: GridFrame) -> tuple[tuple[slice, slice], np.
     return where, paint_boxes(Boxes(rows), part)
 
 
-def _blame(where: tuple[slice, slice], masks: list, kept: set[int]) -> set[int]:
-    """Of the pieces around a cut-off region, the one that covers most of its surroundings."""
-    reach = 5
-    r0, r1, c0, c1 = where[0].start - reach, where[0].stop + reach, where[1].start - reach, where[1].stop + reach
-    best, worst = 0, set()
-    for k in sorted(kept):
-        (rows, columns), mask = masks[k]
-        part = mask[
-            max(r0 - rows.start, 0) : max(r1 - rows.start, 0), max(c0 - columns.start, 0) : max(c1 - columns.start, 0)
-        ]
-        count = int(part.sum())
-        if count > best:
-            best, worst = count, {k}
-    return worst
+def _blame(regions: np.ndarray, main: int, bad: set[int], masks: list, kept: set[int], pieces: list[Piece]) -> set[int]:
+    """For each region that is cut off, the piece to take away: one that lies between it and others."""
+    steps, (rows, columns) = distance_transform_edt(regions == 0, return_indices=True)  # type: ignore[misc]
+    nearest = np.where(steps < BETWEEN / CHECKED_AT, regions[rows, columns], 0)
+    beside = {k: set(np.unique(nearest[masks[k][0]][masks[k][1]]).tolist()) - {0} for k in kept}
+    gone: set[int] = set()
+    for region in bad:
+        near = [k for k in kept if region in beside[k]]
+        between = [k for k in near if main in beside[k]] or [k for k in near if len(beside[k]) > 1] or near
+        if between and not gone & set(between):
+            # chairs go before tables, small things before large ones
+            gone.add(min(between, key=lambda k: (pieces[k].chief, masks[k][1].sum(), k)))
+    return gone
 
 
 def _joined(floor: np.ndarray, frame: GridFrame, windows: list[tuple[slice, slice]], owners: list[int]) -> bool:

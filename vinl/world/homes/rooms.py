@@ -48,11 +48,13 @@ def draw_rooms(rng: Random, config: HomeConfig) -> list[Room]:
     rects: list[Rect] = []
     halls: list[Rect] = []
     loft = rng.random() < config.loft_share
+    # larger homes have larger rooms, not only more of them
+    room = rng.uniform(12.0, 22.0) * max(1.0, (area / 110.0) ** 0.5)
     for wing in wings:
         if loft:
             _cut_loft(wing, rng, rects)
         elif rng.random() >= config.corridor_share or not _cut_along_corridor(wing, rng, config, rects, halls):
-            _split(wing, rng, rng.uniform(8.0, 24.0), rects)
+            _split(wing, rng, room, rects)
     rects = _drop_corner(rng, rects, halls, low)
     rooms = _name_rooms(rng, rects, halls)
     if rng.random() < config.open_plan_share:
@@ -74,18 +76,18 @@ def _draw_wings(rng: Random, area: float, config: HomeConfig) -> list[Rect]:
     return [(0.0, 0.0, width, round(area / width, 2))]
 
 
-def _split(rect: Rect, rng: Random, target: float, out: list[Rect]) -> None:
-    """Halve until the rooms are no larger than the target [m2], which is drawn anew on the way down."""
+def _split(rect: Rect, rng: Random, size: float, out: list[Rect]) -> None:
+    """Halve until the rooms are about as large as wanted [m2]."""
     x0, y0, x1, y1 = rect
     w, h = x1 - x0, y1 - y0
     long, short = max(w, h), min(w, h)
-    if (w * h <= target and long < 2.4 * short) or long < 2 * NARROWEST + 0.3:
+    if (w * h <= size * rng.uniform(0.7, 1.8) and long < 2.4 * short) or long < NARROWEST + LEAST_SIDE:
         out.append(rect)
         return
-    least = NARROWEST if long < 2 * LEAST_SIDE + 0.2 else LEAST_SIDE
+    least = NARROWEST if long < NARROWEST + LEAST_SIDE + 1.0 else LEAST_SIDE
     at = min(max(rng.uniform(0.3, 0.7) * long, least), long - least)
     for part in _halve(rect, at, w >= h if rng.random() < 0.85 or short < 2 * LEAST_SIDE else w < h):
-        _split(part, rng, rng.uniform(7.0, 22.0) if rng.random() < 0.7 else target, out)
+        _split(part, rng, size, out)
 
 
 def _halve(rect: Rect, at: float, across_x: bool) -> tuple[Rect, Rect]:
@@ -136,17 +138,23 @@ def _cut_along_corridor(rect: Rect, rng: Random, config: HomeConfig, out: list[R
 
 
 def _slice(x0: float, x1: float, y0: float, y1: float, rng: Random) -> list[Rect]:
-    """Rooms side by side, of uneven widths; a deep one may have a small room behind it."""
-    depth = y1 - y0
-    wanted = min(max(rng.uniform(9.0, 20.0) / depth, 2.3), 5.5)
-    n = max(round((x1 - x0) / wanted), 1)
-    shares = [rng.uniform(0.6, 1.6) for _ in range(n)]
-    spare = (x1 - x0) - n * NARROWEST
-    if spare < 0:
+    """Rooms side by side, of uneven widths, a few of them as narrow as a bath."""
+    length, depth = x1 - x0, y1 - y0
+    wanted = min(max(rng.uniform(10.0, 22.0) / depth, 2.6), 6.0)
+    shares, narrow, left = [], [], length
+    while left > 0.6 * wanted or not shares:
+        thin = rng.random() < 0.25 and left < length - 0.1
+        narrow.append(rng.uniform(NARROWEST, 2.3) if thin else 0.0)
+        shares.append(0.0 if thin else rng.uniform(0.8, 1.4))
+        left -= narrow[-1] or wanted * shares[-1]
+    spare = length - sum(narrow)
+    if spare < LEAST_SIDE * sum(share > 0 for share in shares):
         return [(x0, y0, x1, y1)]
+    order = list(range(len(shares)))
+    rng.shuffle(order)
     edges = [x0]
-    for share in shares[:-1]:
-        edges.append(round(edges[-1] + NARROWEST + spare * share / sum(shares), 2))
+    for k in order[:-1]:
+        edges.append(round(edges[-1] + (narrow[k] or spare * shares[k] / sum(shares)), 2))
     edges.append(x1)
     return [(a, y0, b, y1) for a, b in pairwise(edges)]
 
@@ -200,14 +208,17 @@ def _name_rooms(rng: Random, rects: list[Rect], halls: list[Rect]) -> list[Room]
     large = [r for r in order if r not in small]
     if not large:
         large, small = small[:1], small[1:]
+    # the living room is large and lies at many others
+    hub = max(large[:3], key=lambda r: measure(r) * (1.0 + 0.12 * sum(_touch(r, other) for other in rects)))
+    large = [hub, *(r for r in large if r is not hub)]
     rooms = [Room("hall", [r]) for r in halls] + [Room("living", [large[0]])]
     rest = sorted(large[1:], key=lambda r: (not _touch(r, large[0]), rng.random()))
     uses = ["kitchen", "bedroom", "bedroom"]
     extra = ["bedroom", "office", "dining", "child", "bedroom", "living", "child", "office"]
     rooms += [Room(uses[k] if k < 3 else extra[rng.randrange(len(extra))], [r]) for k, r in enumerate(rest)]
     rng.shuffle(small)
-    baths = ["bath", "wc", "store", "bath", "store", "hall"]
-    rooms += [Room(baths[min(k, 5)], [r]) for k, r in enumerate(small)]
+    baths = ["bath", "wc", "store", "bath", "store"]
+    rooms += [Room(baths[k % 5], [r]) for k, r in enumerate(small)]
     return rooms
 
 
