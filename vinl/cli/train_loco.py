@@ -14,7 +14,8 @@ from vinl.config.errors import InputError
 
 @dataclass(frozen=True)
 class Options:
-    """Train a locomotor with PPO in MJX. The run's folder holds checkpoint, curves and, at any time, the policy.
+    """Train a locomotor in MJX, with PPO or, in stage 3, from a teacher. The run's folder holds checkpoint, curves
+    and, at any time, the policy.
 
     Ctrl-C saves and stops; --resume goes on. Any setting of the config can be given as key=value, for example
     ppo.epochs=3 or commands.forward='[0, 1]'.
@@ -23,7 +24,8 @@ class Options:
     overrides: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
     """Settings of the config as key=value."""
     stage: int = 1
-    """1: walk on rough ground with the height scan. 2: step over blocks, seeing them in the height scan."""
+    """1: walk on rough ground with the height scan. 2: step over blocks, seeing them in the height scan.
+    3: step over blocks, seeing them through a depth camera; learns from a policy of stage 2."""
     from_policy: Annotated[str | None, tyro.conf.arg(name="from")] = None
     """Start from the networks of this policy (a shipped name or a folder) or run; default: the config's."""
     config: str | None = None
@@ -44,7 +46,7 @@ class Options:
     """Seconds between checkpoints."""
 
 
-STAGES = {1: "loco/rough", 2: "loco/teacher"}
+STAGES = {1: "loco/rough", 2: "loco/teacher", 3: "loco/student"}
 
 
 def main(argv: list[str]) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields, replace
 
 from vinl.config.errors import InputError
+from vinl.loco.student_config import StudentConfig
 from vinl.robot.aliengo import KD, KP
 from vinl.world.terrain import TerrainConfig
 
@@ -256,13 +257,15 @@ class LocoConfig:
     """One locomotion training.
 
     Attributes:
-        stage: 1 (rough ground) or 2 (blocks).
+        stage: 1 (rough ground), 2 (blocks) or 3 (blocks, seen through a camera).
         from_policy: the policy or run whose networks the training starts from; None: fresh ones.
         num_envs: robots in parallel.
         iterations: updates.
         seed: of everything random.
         episode_length: [s] [ViNL config: 20].
         kp, kd: joint gains [N m / rad, N m s / rad].
+        ppo, anneal: not used by stage 3.
+        student: stage 3 alone.
     """
 
     stage: int = 1
@@ -280,10 +283,13 @@ class LocoConfig:
     curriculum: CurriculumConfig = field(default_factory=CurriculumConfig)
     ppo: PpoConfig = field(default_factory=PpoConfig)
     anneal: AnnealConfig = field(default_factory=AnnealConfig)
+    student: StudentConfig | None = None
 
     def __post_init__(self) -> None:
-        if self.stage not in (1, 2):
-            raise InputError(f"stage {self.stage} does not exist; choose 1 or 2")
+        if self.stage not in (1, 2, 3):
+            raise InputError(f"stage {self.stage} does not exist; choose 1, 2 or 3")
+        if (self.stage == 3) != (self.student is not None):
+            raise InputError(f"stage {self.stage}: the group student belongs to stage 3, and to no other")
         if not 1 <= self.num_envs <= 65536:
             raise InputError(f"num_envs must lie between 1 and 65536, got {self.num_envs}")
         if self.iterations < 1:

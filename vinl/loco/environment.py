@@ -102,6 +102,7 @@ class StepResult(NamedTuple):
     Attributes:
         observation: (n, 235) with noise, for the actor; exact: (n, 235) without, for the critic.
         reward: (n,); done: (n,) 1 where fallen or out of time; timeout: (n,) 1 where out of time.
+        pose: (n, 7) position [m] and quaternion of the trunk, which belong to the observation.
     """
 
     observation: Float[Array, "n 235"]
@@ -109,6 +110,7 @@ class StepResult(NamedTuple):
     reward: Float[Array, " n"]
     done: UInt8[Array, " n"]
     timeout: UInt8[Array, " n"]
+    pose: Float[Array, "n 7"]
 
 
 class LocoEnvironment:
@@ -149,6 +151,10 @@ class LocoEnvironment:
     def observe(self) -> tuple[Float[Array, "n 235"], Float[Array, "n 235"]]:
         """The observations of the present state, with noise and without."""
         return self._look(self.simulation.ground, self.state)
+
+    def trunk_pose(self) -> Float[Array, "n 7"]:
+        """Position [m] and quaternion of the trunks in the present state; a copy that outlives the next step."""
+        return jnp.array(self.state.body.qpos[:, :7])
 
     def step(self, action: Float[Array, "n 12"]) -> StepResult:
         """One control step; robots whose episode ends start anew at once. The old state is given up."""
@@ -321,7 +327,8 @@ class LocoEnvironment:
         )
         state = _strong(state)
         noisy, exact = self._observations(ground, state)
-        return state, StepResult(noisy, exact, reward, done.astype(jnp.uint8), timeout.astype(jnp.uint8))
+        ends = done.astype(jnp.uint8), timeout.astype(jnp.uint8)
+        return state, StepResult(noisy, exact, reward, *ends, state.body.qpos[:, :7])
 
     def _motion(
         self, old: State, body: Body, contacts: Contacts, torque: Array, action: Array, broken: Array

@@ -1,4 +1,4 @@
-"""Training of the locomotor: rsl-rl PPO on the MJX environment."""
+"""Training of the locomotor: rsl-rl PPO on the MJX environment; stage 3 is handed on to ``student``."""
 
 from __future__ import annotations
 
@@ -108,6 +108,10 @@ def train_locomotor(
     resume = config is None
     if config is None:
         config = build_config(LocoConfig, run.open(), source=str(run.path / "config.yaml"))
+    if config.stage == 3:
+        from vinl.loco.student import train_student  # Warp is started for stage 3 alone
+
+        return train_student(config, run, resume, device, name, save_every, iterations)
     begun = resume and (run.path / CHECKPOINT).exists()
     start = load_warm_start(config.from_policy, config) if config.from_policy and not begun else None
     if not resume:

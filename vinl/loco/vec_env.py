@@ -39,21 +39,23 @@ class LocoVecEnv(VecEnv):
 
     def get_observations(self) -> TensorDict:
         """Of the present state."""
-        noisy, exact = self.environment.observe()
-        return self._pack(self._to_torch(noisy).clone(), self._to_torch(exact).clone())
+        noisy, exact = (self._to_torch(x).clone() for x in self.environment.observe())
+        return self._pack(noisy, exact, self._to_torch(self.environment.trunk_pose()).clone(), None)
 
     def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
         """Actions (n, 12) to observations, rewards (n,), dones (n,) and ``time_outs`` (n,)."""
-        if self._on_gpu:
-            lent = self._actions[self._count % _LENT]
-            self._count += 1
-            lent.copy_(actions)
-            result = self.environment.step(jax.dlpack.from_dlpack(lent))
-            self._results.append(result)
-        else:
-            result = self.environment.step(jax.numpy.asarray(actions.numpy()))
-        noisy, exact, reward, done, timeout = (self._to_torch(x) for x in result)
-        return self._pack(noisy, exact), reward, done, {"time_outs": timeout.float()}
+        noisy, exact, reward, done, timeout, pose = (self._to_torch(x) for x in self._simulate(actions))
+        return self._pack(noisy, exact, pose, done), reward, done, {"time_outs": timeout.float()}
+
+    def _simulate(self, actions: torch.Tensor) -> StepResult:
+        if not self._on_gpu:
+            return self.environment.step(jax.numpy.asarray(actions.numpy()))
+        lent = self._actions[self._count % _LENT]
+        self._count += 1
+        lent.copy_(actions)
+        result = self.environment.step(jax.dlpack.from_dlpack(lent))
+        self._results.append(result)
+        return result
 
     def read_measures(self) -> dict[str, float]:
         """Means since the last call."""
@@ -77,7 +79,10 @@ class LocoVecEnv(VecEnv):
             raise ValueError(f"it holds {len(saved[1])} robots, this run has {self.num_envs}")
         self.environment.state = jax.device_put(jax.tree.unflatten(shape, saved), jax.devices()[0])
 
-    def _pack(self, noisy: torch.Tensor, exact: torch.Tensor) -> TensorDict:
+    def _pack(
+        self, noisy: torch.Tensor, exact: torch.Tensor, pose: torch.Tensor, done: torch.Tensor | None
+    ) -> TensorDict:
+        """``pose`` (n, 7) of the trunks; ``done`` (n,) where an episode has just begun, None: no step was made."""
         return TensorDict({"policy": noisy, "critic": exact}, batch_size=[self.num_envs])
 
     def _to_torch(self, x: jax.Array) -> torch.Tensor:

@@ -6,10 +6,11 @@ import hashlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from torch import Tensor
+from torch import Tensor, nn
 
 from vinl.config.errors import InputError
 from vinl.loco.config import LocoConfig
+from vinl.policies.card import PolicyCard
 from vinl.policies.io import find_policy, load_policy
 from vinl.policies.networks import BlindActor, MapActor
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
@@ -64,7 +65,7 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
         InputError: no such policy, one of another kind, of other sizes or with other joint gains.
     """
     policy = load_policy(name_or_path)
-    card, network, p = policy.card, policy.network, config.ppo
+    network, p = policy.network, config.ppo
     fresh = MapActor(encoder=p.encoder, code=p.code, actor=p.actor) if p.map else BlindActor(actor=p.actor)
     wanted = fresh.describe()
     if network.describe() != wanted:
@@ -72,15 +73,58 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
             f"--from {name_or_path}: its network {_list(network.describe())} is not that of this training "
             f"{_list(wanted)}; set ppo.map, ppo.encoder, ppo.code and ppo.actor to its own, or give another policy"
         )
+    check_gains(name_or_path, policy.card, config)
+    actor = {name: weight.clone() for name, weight in network.state_dict().items()}
+    critic = _load_critic(name_or_path, config)
+    return WarmStart(actor, critic, find_origin(policy.card, network, critic is not None))
+
+
+def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origin]:
+    """The teacher of a student, and where it comes from.
+
+    Args:
+        name_or_path: as for ``load_warm_start``.
+        config: of the student's training.
+
+    Raises:
+        InputError: no such policy, one that does not read the height scan, or one with other joint gains.
+    """
+    policy = load_policy(name_or_path)
+    if not isinstance(policy.network, MapActor):
+        kind = _KINDS.get(type(policy.network).__name__, type(policy.network).__name__)
+        raise InputError(
+            f"--from {name_or_path}: a student learns from a locomotor with a height scan (MapActor, such as "
+            f"vinl/teacher); this is {kind}"
+        )
+    check_gains(name_or_path, policy.card, config)
+    return policy.network, find_origin(policy.card, policy.network, critic=False)
+
+
+_KINDS = {
+    "BlindActor": "a locomotor without a map (BlindActor)",
+    "DepthActor": "a student itself (DepthActor)",
+    "NavActor": "a navigator (NavActor)",
+}
+
+
+def check_gains(name_or_path: str, card: PolicyCard, config: LocoConfig) -> None:
+    """Refuse a policy that was trained with other joint gains.
+
+    Raises:
+        InputError: it was.
+    """
     gains = float(card.action["kp"]), float(card.action["kd"])
     if gains != (config.kp, config.kd):
         raise InputError(
             f"--from {name_or_path}: it was trained with kp {gains[0]:g} and kd {gains[1]:g}; set kp and kd"
         )
-    actor = {name: weight.clone() for name, weight in network.state_dict().items()}
-    digest = hashlib.sha256(b"".join(weight.numpy().tobytes() for weight in actor.values())).hexdigest()[:12]
-    critic = _load_critic(name_or_path, config)
-    return WarmStart(actor, critic, Origin(card.name, card.samples, card.commit, digest, critic is not None))
+
+
+def find_origin(card: PolicyCard, network: nn.Module, critic: bool) -> Origin:
+    """What the card of the new policy says about the old one."""
+    weights = network.state_dict().values()
+    digest = hashlib.sha256(b"".join(weight.cpu().numpy().tobytes() for weight in weights)).hexdigest()[:12]
+    return Origin(card.name, card.samples, card.commit, digest, critic)
 
 
 def _load_critic(name_or_path: str, config: LocoConfig) -> dict[str, Tensor] | None:

@@ -73,6 +73,17 @@ class DepthMemory(nn.Module):
             return ()
         return tuple(torch.zeros(self.layers, n, self.hidden, device=device) for _ in range(2))
 
+    def spread_memory(self, steps: int) -> None:
+        """Start the LSTM's cells so that they keep what they hold for 1 to ``steps`` steps, spread evenly over the
+        cells: the biases of the forget gates are the logarithms of these times, those of the input gates the opposite
+        [Tallec and Ollivier 2018]. With zero biases a cell forgets within two steps."""
+        times = torch.linspace(1, max(steps - 1, 1), self.hidden)
+        with torch.no_grad():
+            for cell in self.cells:
+                assert isinstance(cell, nn.LSTMCell)
+                cell.bias_ih[: self.hidden] = -times.log()
+                cell.bias_ih[self.hidden : 2 * self.hidden] = times.log()
+
     def forward(
         self,
         depth: Float[Tensor, "t n height width"] | None,

@@ -1,0 +1,144 @@
+"""Stage 3: a student with a camera learns from a teacher with a height scan, in the same MJX environment."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import torch
+
+from vinl.config.errors import InputError
+from vinl.config.loader import dump_config
+from vinl.loco.config import LocoConfig
+from vinl.loco.distillation import Distillation
+from vinl.loco.environment import LocoEnvironment
+from vinl.loco.scenery import terrain_mesh
+from vinl.loco.sight import Sight
+from vinl.loco.sighted_env import SightedVecEnv
+from vinl.loco.student_config import StudentConfig
+from vinl.loco.warm_start import load_teacher
+from vinl.policies.card import PolicyCard, describe_action, locomotion_card
+from vinl.policies.commit import find_commit
+from vinl.policies.depth_actor import DepthActor
+from vinl.policies.io import save_policy
+from vinl.policies.networks import MapActor
+from vinl.rl.loop import TrainingLoop
+from vinl.rl.run_folder import RunFolder
+from vinl.rl.stopwatch import Stopwatch
+
+TEACHER = "teacher"
+"""Folder inside the run that keeps the teacher, so that a run can be resumed without it."""
+
+PROFILE_EVERY = 50
+"""Iterations between those in which the parts are timed: to time them is to wait for the device."""
+
+
+def describe_student_figures(row: dict[str, float]) -> dict[str, str]:
+    """What the progress bar shows."""
+    return {
+        "samples/s": f"{row['samples_per_second']:,.0f}",
+        "code": f"{row['loss/unexplained']:.1%} unexplained",
+        "action": f"{row['loss/action']:.4f}",
+        "feet/m": f"{row['foot_block_per_m']:.2f}",
+        "falls/min": f"{row['falls_per_minute']:.2f}",
+    }
+
+
+def build_student(config: StudentConfig, teacher: MapActor) -> DepthActor:
+    """A fresh student in front of a teacher's actor."""
+    net, camera, sizes = config.network, config.camera, teacher.arguments
+    student = DepthActor(
+        vision=net.vision,
+        height=camera.height,
+        width=camera.width,
+        visual=net.visual,
+        hidden=net.hidden,
+        layers=net.layers,
+        memory=net.memory,
+        planes=net.planes,
+        proprioception=sizes["proprioception"],
+        code=sizes["code"],
+        actor=sizes["actor"],
+        actions=sizes["actions"],
+    )
+    if net.remember:
+        student.memory.spread_memory(net.remember)
+    return student
+
+
+def train_student(
+    config: LocoConfig,
+    run: RunFolder,
+    resume: bool,
+    device: str = "cpu",
+    name: str = "",
+    save_every: float = 60.0,
+    iterations: int | None = None,
+) -> bool:
+    """Train a student, or go on with a run; arguments as for ``train_locomotor``.
+
+    Returns:
+        Whether the run is complete.
+
+    Raises:
+        InputError: there is no teacher, or it cannot be learned from.
+    """
+    settings = config.student
+    assert settings is not None
+    kept = run.path / TEACHER
+    source = str(kept) if resume and kept.is_dir() else config.from_policy
+    if source is None:
+        raise InputError("stage 3 needs a teacher: give --from vinl/teacher, a policy folder or a run of stage 2")
+    teacher, origin = load_teacher(source, config)
+    if not resume:
+        run.create(dump_config(config))
+    if not kept.is_dir():
+        run.write_origin(asdict(origin))
+        network = teacher.describe()
+        save_policy(kept, teacher, _teacher_card(origin.policy, config, network, origin.samples, origin.commit))
+    described = run.read_origin()
+    torch.manual_seed(config.seed)
+    torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
+    stopwatch = Stopwatch(device)
+    student = build_student(settings, teacher)
+    environment = LocoEnvironment(config)
+    camera = settings.camera.record()
+    mesh = terrain_mesh(environment.terrain)
+    sight = Sight(mesh, camera, settings.sight, config.num_envs, device, config.seed)
+    env = SightedVecEnv(environment, sight, device, stopwatch)
+    algorithm = Distillation(student, teacher, settings.distillation, config.num_envs, device, stopwatch)
+    commit = find_commit()
+
+    def export(policy: DepthActor, samples: int) -> None:
+        action = {**describe_action(), "kp": config.kp, "kd": config.kd}
+        card = locomotion_card(
+            name or run.path.name,
+            policy.describe(),
+            action,
+            scan=False,
+            camera=camera.describe() if policy.image else None,
+            training={**dump_config(config), "origin": described},
+            seed=config.seed,
+            samples=samples,
+            commit=commit,
+        )
+        save_policy(run.policy, policy, card)
+
+    def schedule(learner: Distillation, share: float) -> None:
+        learner.learning_rate = settings.distillation.rate_at(share)
+        learner.teacher_share = settings.distillation.teacher_share_at(share)
+        # the first iteration compiles: it would tell nothing
+        stopwatch.running = loop.current_learning_iteration % PROFILE_EVERY == 1
+
+    steps = settings.distillation.steps
+    loop = TrainingLoop(
+        env, algorithm, steps, run, device, export, describe_student_figures, schedule, save_every, stopwatch
+    )
+    if resume:
+        loop.resume()
+    return loop.train(iterations or config.iterations)
+
+
+def _teacher_card(name: str, config: LocoConfig, network: dict[str, Any], samples: int, commit: str) -> PolicyCard:
+    action = {**describe_action(), "kp": config.kp, "kd": config.kd}
+    return locomotion_card(name, network, action, samples=samples, commit=commit)

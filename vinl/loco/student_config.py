@@ -1,0 +1,186 @@
+"""What stage 3 can be told: the student's network, its camera, what is random about that, and how it learns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+from vinl.config.errors import InputError
+from vinl.policies.depth_memory import MEMORIES, VISIONS
+from vinl.robot.cameras import LOCOMOTION_CAMERA, Camera
+
+LOSSES = ("code", "action", "both")
+HOLES = ("far", "zero")
+
+
+def _check_share(name: str, value: float) -> None:
+    if not 0 <= value <= 1:
+        raise InputError(f"{name} must lie between 0 and 1, got {value}")
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """The student's network; the actor behind it is the teacher's [paper III-C].
+
+    Attributes:
+        vision: ``cnn``, ``resnet18`` or ``none`` (blind, but with memory).
+        visual: numbers that the image becomes.
+        hidden, layers: of the memory.
+        memory: ``lstm``, or ``mlp`` for plain layers without memory [paper IV-B].
+        planes: channels of the first stage of ``resnet18``.
+        remember: at the start the LSTM's cells keep what they hold for 1 to this many control steps, spread evenly;
+            0: the paper's start, which forgets within two steps.
+    """
+
+    vision: str = "cnn"
+    visual: int = 32
+    hidden: int = 64
+    layers: int = 2
+    memory: str = "lstm"
+    planes: int = 32
+    remember: int = 50
+
+    def __post_init__(self) -> None:
+        if self.vision not in VISIONS:
+            raise InputError(f"student.network.vision must be one of {', '.join(VISIONS)}, got {self.vision!r}")
+        if self.memory not in MEMORIES:
+            raise InputError(f"student.network.memory must be one of {', '.join(MEMORIES)}, got {self.memory!r}")
+        if min(self.visual, self.hidden, self.layers, self.planes) < 1 or self.planes % 16:
+            raise InputError("student.network: sizes must be at least 1, planes a multiple of 16")
+        if self.remember < 0 or self.remember == 1:
+            raise InputError(f"student.network.remember must be 0 or at least 2, got {self.remember}")
+
+
+@dataclass(frozen=True)
+class CameraConfig:
+    """The student's camera: ``LOCOMOTION_CAMERA`` with another image.
+
+    Attributes:
+        width, height: of the image [pixels].
+        hfov: horizontal field of view [rad]; pixels are square.
+        pitch_down: of the optical axis [rad].
+        far: what is farther reads as this [m].
+    """
+
+    width: int = LOCOMOTION_CAMERA.width
+    height: int = LOCOMOTION_CAMERA.height
+    hfov: float = LOCOMOTION_CAMERA.hfov
+    pitch_down: float = LOCOMOTION_CAMERA.pitch_down
+    far: float = LOCOMOTION_CAMERA.far
+
+    def __post_init__(self) -> None:
+        self.record()
+        if min(self.width, self.height) < 16:
+            raise InputError(f"student.camera: at least 16 x 16 pixels, got {self.width} x {self.height}")
+
+    def record(self) -> Camera:
+        """The camera record, as it goes onto the policy card."""
+        size = {"width": self.width, "height": self.height}
+        return replace(LOCOMOTION_CAMERA, hfov=self.hfov, pitch_down=self.pitch_down, far=self.far, **size)
+
+
+@dataclass(frozen=True)
+class SightConfig:
+    """What differs between what the camera record says and what the student sees; drawn anew for every episode.
+
+    Attributes:
+        position: largest offset of the camera along each axis [m].
+        angle: largest error of its roll, pitch and yaw [rad].
+        zoom: largest relative error of the tangent of half the field of view.
+        scale: largest relative error of all depths of an image.
+        noise: standard deviation of each pixel's depth, as a share of the depth.
+        holes: largest share of the image that is missing; each episode draws its own up to this.
+        hole_size: side of the squares that are missing [pixels].
+        hole_reads: what a missing pixel reads: ``far`` or ``zero``.
+        delay: share of the episodes in which every image comes one control step late.
+    """
+
+    position: float = 0.01
+    angle: float = math.radians(2.0)
+    zoom: float = 0.02
+    scale: float = 0.02
+    noise: float = 0.01
+    holes: float = 0.04
+    hole_size: int = 4
+    hole_reads: str = "far"
+    delay: float = 0.3
+
+    def __post_init__(self) -> None:
+        if min(self.position, self.angle, self.noise) < 0:
+            raise InputError("student.sight: position, angle and noise must not be negative")
+        for name in ("zoom", "scale", "holes", "delay"):
+            _check_share(f"student.sight.{name}", getattr(self, name))
+        if self.hole_size < 1:
+            raise InputError(f"student.sight.hole_size must be at least 1, got {self.hole_size}")
+        if self.hole_reads not in HOLES:
+            raise InputError(f"student.sight.hole_reads must be one of {', '.join(HOLES)}, got {self.hole_reads!r}")
+
+
+@dataclass(frozen=True)
+class DistillationConfig:
+    """DAgger: the student drives, the teacher says what it would have done [paper III-C].
+
+    Attributes:
+        steps: control steps of each robot between updates.
+        bptt: control steps that gradients flow back through; divides ``steps``. 1 is the paper's.
+        epochs, minibatches: passes over a roll-out and parts of each; a part holds all steps of some robots.
+        loss: ``code`` (the paper's: the 32 numbers), ``action`` or ``both``.
+        code_weight, action_weight: of the two losses.
+        learning_rate, last_learning_rate: of Adam, at the start and at the end; a cosine between them.
+        warmup: share of the iterations in which the rate rises from zero.
+        max_grad_norm: gradients are clipped to this norm.
+        teacher_share: share of the robots that the teacher drives at the start; 0 is the paper's.
+        teacher_until: share of the iterations after which it drives none.
+        exploration: standard deviation of noise on the student's actions [1, times 0.25 rad].
+        bfloat16: the convolutions in bfloat16 on a GPU.
+    """
+
+    steps: int = 24
+    bptt: int = 24
+    epochs: int = 2
+    minibatches: int = 8
+    loss: str = "both"
+    code_weight: float = 1.0
+    action_weight: float = 1.0
+    learning_rate: float = 1e-3
+    last_learning_rate: float = 3e-5
+    warmup: float = 0.01
+    max_grad_norm: float = 1.0
+    teacher_share: float = 1.0
+    teacher_until: float = 0.04
+    exploration: float = 0.0
+    bfloat16: bool = True
+
+    def __post_init__(self) -> None:
+        if min(self.steps, self.bptt, self.epochs, self.minibatches) < 1:
+            raise InputError("student.distillation: steps, bptt, epochs and minibatches must be at least 1")
+        if self.steps % self.bptt:
+            raise InputError(f"student.distillation.bptt must divide steps {self.steps}, got {self.bptt}")
+        if self.loss not in LOSSES:
+            raise InputError(f"student.distillation.loss must be one of {', '.join(LOSSES)}, got {self.loss!r}")
+        if not 0 < self.last_learning_rate <= self.learning_rate or self.max_grad_norm <= 0:
+            raise InputError("student.distillation: need 0 < last_learning_rate <= learning_rate and max_grad_norm > 0")
+        if min(self.exploration, self.code_weight, self.action_weight) < 0:
+            raise InputError("student.distillation: exploration and the weights must not be negative")
+        for name in ("teacher_share", "teacher_until", "warmup"):
+            _check_share(f"student.distillation.{name}", getattr(self, name))
+
+    def rate_at(self, share: float) -> float:
+        """The learning rate after a share of the iterations."""
+        rise = min((share + 1e-3) / self.warmup, 1.0) if self.warmup > 0 else 1.0
+        wave = 0.5 * (1 + math.cos(math.pi * min(share, 1.0)))
+        return rise * (self.last_learning_rate + wave * (self.learning_rate - self.last_learning_rate))
+
+    def teacher_share_at(self, share: float) -> float:
+        """The share of robots that the teacher drives after a share of the iterations."""
+        return self.teacher_share * max(1 - share / self.teacher_until, 0.0) if self.teacher_until > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class StudentConfig:
+    """Stage 3: the settings that the other stages do not have."""
+
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+    camera: CameraConfig = field(default_factory=CameraConfig)
+    sight: SightConfig = field(default_factory=SightConfig)
+    distillation: DistillationConfig = field(default_factory=DistillationConfig)
