@@ -13,7 +13,7 @@ from torch import Tensor
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
 from vinl.nav.home_store import HomeStore
-from vinl.nav.kernels import Robots, aim_cameras, move_robots, place_robots, render_interior
+from vinl.nav.kernels import Robots, aim_cameras, measure_robots, move_robots, place_robots, render_interior
 from vinl.nav.measures import EpisodeEnd, Measures, end_episodes
 from vinl.nav.rules import write_rules
 from vinl.robot.cameras import Camera
@@ -240,27 +240,25 @@ class NavEnvironment:
         position: Float[Tensor, "n 2"],
         yaw: Float[Tensor, " n"],
     ) -> None:
-        """Put all robots where one wants them; distances follow with the next step.
+        """Begin an episode of every robot where one wants it; camera and execution are drawn as always.
 
         Args:
             home: slot of the store.
             goal: number of the goal in that home.
             position: of the robots' middles [m].
             yaw: headings [rad].
+
+        Raises:
+            InputError: a goal cannot be reached from its robot's place. The host waits for the device to know.
         """
         self.restart()
         for name, values in (("home", home), ("goal", goal), ("position", position), ("yaw", yaw)):
             self.state[name].copy_(torch.as_tensor(values))
         self.state["generation"].copy_(self.homes.generations()[self.state["home"].long()])
-        self.state["speed"].zero_()
-        # a step on the spot: reads the distances and moves nothing
-        self.state["action"].copy_(torch.tensor([-1.0, 0.0]))
-        self._launch(
-            move_robots,
-            self.num_envs,
-            [self.homes.homes, self._rules, "chance", "action", self._robots, "moved", "blocked", "straight"],
-        )
-        self.state["action"].zero_()
+        self._launch(measure_robots, self.num_envs, [self.homes.homes, self._robots])
+        lost = (~torch.isfinite(self.state["distance"])).nonzero()
+        if len(lost):
+            raise InputError(f"robot {int(lost[0])} cannot reach its goal from where it was placed")
         self.state["start_distance"].copy_(self.state["distance"])
         self._observation = None
 

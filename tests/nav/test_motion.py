@@ -1,0 +1,95 @@
+"""Arcs, collisions against exact geometry, imperfect execution."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+import torch
+
+from vinl.nav.config import ExecutionConfig
+from vinl.nav.environment import NavEnvironment
+from vinl.world.boxes import Boxes
+from vinl.world.floorplan import BODY_HEIGHT
+
+N = 400
+
+
+@pytest.fixture(scope="module")
+def blind(config):
+    return replace(config, num_envs=N, camera=None)
+
+
+def scatter(homes, rng) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Slots, places and headings near the starts, at which nothing is promised."""
+    home = rng.integers(len(homes), size=N)
+    spots = np.stack([homes.homes.starts.numpy()[h, rng.integers(128)] for h in home])
+    return home, spots + rng.uniform(-0.15, 0.15, (N, 2)), rng.uniform(-math.pi, math.pi, N)
+
+
+def follow_arc(xy, yaw, v, w, t):
+    """The pose after t seconds at constant forward speed and yaw rate."""
+    if abs(w) < 1e-9:
+        return xy + v * t * np.array([math.cos(yaw), math.sin(yaw)]), yaw
+    turn = np.array([math.sin(yaw + w * t) - math.sin(yaw), math.cos(yaw) - math.cos(yaw + w * t)])
+    return xy + v / w * turn, yaw + w * t
+
+
+def rectangles(poses, length, width):
+    rows = [[*xy, yaw, length, width, 0.0, 1.0] for xy, yaw in poses]
+    return shapely.polygons(Boxes(np.array(rows)).corners())
+
+
+def test_moves_on_arcs_and_is_stopped_as_exact_geometry_says(blind, homes):
+    rng = np.random.default_rng(0)
+    environment = NavEnvironment(blind, homes)
+    home, xy, yaw = scatter(homes, rng)
+    environment.place(torch.tensor(home), torch.zeros(N, dtype=torch.int64), torch.tensor(xy), torch.tensor(yaw))
+    action = rng.uniform(-1, 1, (N, 2)).astype(np.float32)
+    action[:5, 1] = 0.0  # straight on
+    environment.advance(torch.tensor(action))
+    ended = environment.ended
+    assert ended is not None
+    blocked, there = ended.collisions.numpy() > 0, environment.state["position"].numpy()
+    low = [Boxes(r.solid[r.solid[:, 5] < BODY_HEIGHT].astype(float)) for r in homes.records]
+    walls = [shapely.union_all([shapely.Polygon(c) for c in boxes.corners()]) for boxes in low]
+    shapely.prepare(walls)
+    judged = 0
+    for k in range(N):
+        v, w = (action[k, 0] + 1) / 2, action[k, 1] * math.pi / 3
+        poses = [follow_arc(xy[k], yaw[k], v, w, t) for t in np.linspace(0.02, 0.5, 25)]
+        sweeps = [rectangles(poses, 0.65 + m, 0.31 + m) for m in (-0.1, 0.1)]
+        surely, maybe = (shapely.intersects(walls[home[k]], sweep).any() for sweep in sweeps)
+        if surely == maybe:  # what lies within 5 cm of touching is left to the grid
+            judged += 1
+            assert blocked[k] == surely, (k, home[k], xy[k], yaw[k], v, w)
+        if not blocked[k]:
+            np.testing.assert_allclose(there[k], poses[-1][0], atol=1e-4)
+            assert abs(math.remainder(environment.state["yaw"][k].item() - poses[-1][1], 2 * math.pi)) < 1e-4
+        else:
+            np.testing.assert_allclose(there[k], xy[k], atol=1e-6)
+    assert judged > 0.7 * N and 0.1 < blocked.mean() < 0.9
+
+
+def test_execution_lags_and_slips(blind, homes):
+    def run(steps, **settings):
+        config = replace(blind, execution=ExecutionConfig(**settings))
+        environment = NavEnvironment(config, homes)
+        moved = []
+        for _ in range(steps):
+            before = environment.state["path"].clone()
+            done = environment.step(torch.tensor([[1.0, 0.0]]).expand(N, 2)).done
+            way = environment.state["path"] - before
+            moved.append(way[(environment.state["in_a_row"] == 0) & ~done & (environment.state["steps"] == _ + 1)])
+        return moved
+
+    perfect = run(2)
+    torch.testing.assert_close(perfect[0], torch.full_like(perfect[0], 0.5))
+    lagging = run(2, lag=0.3)
+    # the integral of 1 - exp(-t / 0.3) over half a second
+    assert lagging[0].median().item() == pytest.approx(0.5 - 0.3 * (1 - math.exp(-0.5 / 0.3)), abs=1e-5)
+    assert lagging[1].max() > lagging[0].median()
+    noisy = run(1, speed_noise=0.1, speed_gain=(0.8, 0.9))
+    assert noisy[0].mean() / 0.5 == pytest.approx(0.85, abs=0.03)
+    assert noisy[0].std() / 0.5 == pytest.approx(math.hypot(0.1, 0.1 / math.sqrt(12)), rel=0.3)
