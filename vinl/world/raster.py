@@ -80,29 +80,36 @@ def paint_boxes(boxes: Boxes, frame: GridFrame) -> Bool[np.ndarray, "rows column
     """The cells whose centre a box's footprint holds; a box thinner than a cell is painted one cell wide, so that no
     wall falls through the grid."""
     grid = np.zeros(frame.shape, dtype=bool)
-    if not len(boxes):
-        return grid
-    rows = boxes.rows.copy()
-    turned = np.abs(np.sin(2 * rows[:, 2])) > 1e-6
-    least = frame.resolution * np.where(turned, np.sqrt(2), 1.0)
-    rows[:, 3], rows[:, 4] = np.maximum(rows[:, 3], least), np.maximum(rows[:, 4], least)
-    # a straight box is a range of rows and columns; one turned by a quarter has its sides swapped
-    quarter = np.abs(np.cos(rows[:, 2])) < 0.5
-    reach = np.where(quarter[:, None], rows[:, [4, 3]], rows[:, [3, 4]]) / 2
-    reach[turned] = (np.abs(Boxes(rows[turned]).corners() - rows[turned, None, :2])).max(1)
-    x, y = frame.centres()
-    first = np.column_stack(
-        [np.searchsorted(line, rows[:, k] - reach[:, k] - 1e-9) for k, line in ((0, x), (1, y))]
-    ).tolist()
-    last = np.column_stack(
-        [np.searchsorted(line, rows[:, k] + reach[:, k] + 1e-9, side="right") for k, line in ((0, x), (1, y))]
-    ).tolist()
-    for row, askew, (c0, r0), (c1, r1) in zip(rows, turned.tolist(), first, last, strict=True):
-        if not askew:
-            grid[r0:r1, c0:c1] = True
-        elif c0 < c1 and r0 < r1:
-            dx, dy = x[None, c0:c1] - row[0], y[r0:r1, None] - row[1]
-            c, s = np.cos(row[2]), np.sin(row[2])
-            held = (np.abs(c * dx + s * dy) <= row[3] / 2 + 1e-9) & (np.abs(c * dy - s * dx) <= row[4] / 2 + 1e-9)
-            grid[r0:r1, c0:c1] |= held
+    for rows, columns, held in find_cells(boxes, frame):
+        grid[rows, columns] |= held
     return grid
+
+
+def find_cells(boxes: Boxes, frame: GridFrame) -> list[tuple[slice, slice, np.ndarray | bool]]:
+    """For every box, what ``paint_boxes`` paints: a range of rows, one of columns, and which cells of these; ``True``
+    is all of them."""
+    if not len(boxes):
+        return []
+    table = boxes.rows.copy()
+    turned = np.abs(np.sin(2 * table[:, 2])) > 1e-6
+    least = frame.resolution * np.where(turned, np.sqrt(2), 1.0)
+    table[:, 3], table[:, 4] = np.maximum(table[:, 3], least), np.maximum(table[:, 4], least)
+    cosine, sine = np.cos(table[:, 2]), np.sin(table[:, 2])
+    cosine[~turned], sine[~turned] = np.rint(cosine[~turned]), np.rint(sine[~turned])
+    across, along = np.abs(cosine), np.abs(sine)
+    reach = np.column_stack([across * table[:, 3] + along * table[:, 4], along * table[:, 3] + across * table[:, 4]])
+    x, y = frame.centres()
+    bounds = [
+        np.searchsorted(line, table[:, k] + sign * (reach[:, k] / 2 + 1e-9), side)  # type: ignore[call-overload]
+        for k, line in ((1, y), (0, x))
+        for sign, side in ((-1, "left"), (1, "right"))
+    ]
+    found: list[tuple[slice, slice, np.ndarray | bool]] = []
+    entries = zip(*(column.tolist() for column in (*bounds, turned, *table.T[[0, 1, 3, 4]], cosine, sine)), strict=True)
+    for r0, r1, c0, c1, askew, x0, y0, length, width, c, s in entries:
+        held: np.ndarray | bool = True
+        if askew:
+            dx, dy = x[None, c0:c1] - x0, y[r0:r1, None] - y0
+            held = (np.abs(c * dx + s * dy) <= length / 2 + 1e-9) & (np.abs(c * dy - s * dx) <= width / 2 + 1e-9)
+        found.append((slice(r0, r1), slice(c0, c1), held))
+    return found

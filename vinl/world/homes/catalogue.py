@@ -78,7 +78,7 @@ def table_with_chairs(rng: Random, length: float, width: float) -> Things:
             if rng.random() < 0.1:
                 continue
             out = rng.uniform(0.3, 0.5) if rng.random() < 0.15 else rng.uniform(0.02, 0.15)
-            turn = (math.pi if side > 0 else 0.0) + rng.gauss(0.0, 0.12)
+            turn = (math.pi if side > 0 else 0.0) + (rng.gauss(0.0, 0.15) if rng.random() < 0.4 else 0.0)
             things.append(move(chair(rng), side * (width / 2 + out), ((k + 0.5) / n - 0.5) * length, turn))
     if length > 1.3 and rng.random() < 0.4:
         things += [move(chair(rng), 0.0, side * (length / 2 + 0.1), -side * math.pi / 2) for side in (1, -1)]

@@ -65,5 +65,7 @@ def generate_home(seed: int, config: HomeConfig | None = None, resolution: float
             x0, y0, x1, y1 = max(room.rects, key=measure)
             labels.append(RoomLabel(room.kind, (x0 + x1) / 2, (y0 + y1) / 2))
         panes = Boxes(np.array(shell.panes).reshape(-1, 7))
-        return assemble_floorplan(name, f"generated:{seed}", walls, furniture, inside, frame, panes, tuple(labels))
+        return assemble_floorplan(
+            name, f"generated:{seed}", walls, furniture, inside, frame, panes, tuple(labels), roomy=True
+        )
     raise InputError("homes: no home fits the config; widen its ranges (area, corridor_width, door_width)")

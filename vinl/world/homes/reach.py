@@ -12,7 +12,7 @@ from vinl.world.free_space import FIT_RADIUS
 from vinl.world.grid import GridFrame
 from vinl.world.homes.furnish import Piece
 from vinl.world.homes.rooms import Rect, Room
-from vinl.world.raster import label_regions, paint_boxes
+from vinl.world.raster import find_cells, label_regions, paint_boxes
 
 CHECKED_AT = 0.1
 """Side of the cells that ways are checked on [m]. A way that is wide enough on these is wide enough on finer ones."""
@@ -43,15 +43,14 @@ def keep_connected(
         ``None`` if the rooms are not connected even without furniture.
     """
     floor = inside & ~paint_boxes(Boxes(walls.rows[walls.rows[:, 5] < BODY_HEIGHT]), frame)
-    masks = [_paint_low(piece, frame) for piece in pieces]
+    cells = _find_low(pieces, frame)
     windows = [_window(rect, frame) for room in rooms for rect in room.rects]
     owners = [k for k, room in enumerate(rooms) for _ in room.rects]
     kept = set(range(len(pieces)))
     for attempt in range(ROUNDS + 1):
         free = floor.copy()
         for k in kept:
-            where, mask = masks[k]
-            free[where] &= ~mask
+            free.flat[cells[k]] = False
         fits = measure_clearance(free, frame.resolution) >= FIT_RADIUS
         regions = label_regions(fits)
         if not regions.any():
@@ -71,7 +70,7 @@ def keep_connected(
             if attempt >= ROUNDS // 2 or not islands:
                 gone |= set(inner) if attempt >= ROUNDS // 2 else set(inner[-1:])
         if bad:
-            gone |= _blame(regions, main, bad, masks, kept, pieces)
+            gone |= _blame(regions, main, bad, cells, kept, pieces)
         if not gone:
             return None if lost else [pieces[k] for k in sorted(kept)]
         kept -= gone
@@ -94,35 +93,30 @@ def _window(rect: Rect, frame: GridFrame) -> tuple[slice, slice]:
     return slice(max(low[0], 0), max(high[0], 0)), slice(max(low[1], 0), max(high[1], 0))
 
 
-def _paint_low(piece: Piece, frame: GridFrame) -> tuple[tuple[slice, slice], np.ndarray]:
-    """The cells under those parts of a piece that take floor from the robot, and the part of the grid they lie in."""
-    rows = np.array([row for row in piece.rows if row[5] < BODY_HEIGHT]).reshape(-1, 7)
-    if not len(rows):
-        return (slice(0, 0), slice(0, 0)), np.zeros((0, 0), bool)
-    reach = np.hypot(rows[:, 3], rows[:, 4]) / 2 + 2 * frame.resolution
-    low, high = (rows[:, :2] - reach[:, None]).min(0), (rows[:, :2] + reach[:, None]).max(0)
-    where = _window((low[0], low[1], high[0], high[1]), frame)
-    part = GridFrame(
-        frame.x0 + where[1].start * frame.resolution,
-        frame.y0 + where[0].start * frame.resolution,
-        frame.resolution,
-        (min(where[0].stop, frame.shape[0]) - where[0].start, min(where[1].stop, frame.shape[1]) - where[1].start),
-    )
-    return where, paint_boxes(Boxes(rows), part)
+def _find_low(pieces: list[Piece], frame: GridFrame) -> list[np.ndarray]:
+    """For each piece the numbers of the cells under those of its parts that take floor from the robot."""
+    rows = [(k, row) for k, piece in enumerate(pieces) for row in piece.rows if row[5] < BODY_HEIGHT]
+    numbers = np.arange(frame.shape[0] * frame.shape[1]).reshape(frame.shape)
+    parts: list[list[np.ndarray]] = [[np.zeros(0, int)] for _ in pieces]
+    boxes = Boxes(np.array([row for _, row in rows]).reshape(-1, 7))
+    for (k, _), (where, along, held) in zip(rows, find_cells(boxes, frame), strict=True):
+        under = numbers[where, along]
+        parts[k].append(under.ravel() if held is True else under[held])
+    return [np.concatenate(part) for part in parts]
 
 
-def _blame(regions: np.ndarray, main: int, bad: set[int], masks: list, kept: set[int], pieces: list[Piece]) -> set[int]:
+def _blame(regions: np.ndarray, main: int, bad: set[int], cells: list, kept: set[int], pieces: list[Piece]) -> set[int]:
     """For each region that is cut off, the piece to take away: one that lies between it and others."""
     steps, (rows, columns) = distance_transform_edt(regions == 0, return_indices=True)  # type: ignore[misc]
     nearest = np.where(steps < BETWEEN / CHECKED_AT, regions[rows, columns], 0)
-    beside = {k: set(np.unique(nearest[masks[k][0]][masks[k][1]]).tolist()) - {0} for k in kept}
+    beside = {k: set(nearest.flat[cells[k]].tolist()) - {0} for k in kept}
     gone: set[int] = set()
     for region in bad:
         near = [k for k in kept if region in beside[k]]
         between = [k for k in near if main in beside[k]] or [k for k in near if len(beside[k]) > 1] or near
         if between and not gone & set(between):
             # chairs go before tables, small things before large ones
-            gone.add(min(between, key=lambda k: (pieces[k].chief, masks[k][1].sum(), k)))
+            gone.add(min(between, key=lambda k: (pieces[k].chief, len(cells[k]), k)))
     return gone
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from itertools import pairwise
 from random import Random
@@ -180,7 +181,7 @@ def _cut_panes(rng: Random, rooms: list[Room], edges: list[Edge], outer: float, 
 
 
 def _pane(edge: Edge, middle: float, width: float, bottom: float, top: float) -> Row:
-    x, y, yaw = (edge.at, middle, 1.5708) if edge.upright else (middle, edge.at, 0.0)
+    x, y, yaw = (edge.at, middle, math.pi / 2) if edge.upright else (middle, edge.at, 0.0)
     return (round(x, 3), round(y, 3), yaw, round(width, 3), 0.08, bottom, top)
 
 
