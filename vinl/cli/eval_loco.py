@@ -35,6 +35,10 @@ class Options:
     """Blocks per m2, for blocks; 0 is level floor under the same rules."""
     level: int | None = None
     """Level of all robots, 0 to 9, for rough; 1 to 9 by turns if not given."""
+    step: bool = False
+    """Also let every policy walk straight over one block: step.png (heights of the feet) and step.mp4."""
+    step_height: float = 0.15
+    """Height of that block [m]."""
     workers: int | None = None
     """Processes; the number of cores by default. Results do not depend on it."""
     device: str = "cpu"
@@ -68,6 +72,8 @@ def main(argv: list[str]) -> int:
     out = check_out(options.out)
     workers = os.cpu_count() or 1 if options.workers is None else options.workers
     check_locomotor_numbers(options.robots, options.seconds, options.seed, workers)
+    if not 0 < options.step_height <= 0.5:
+        raise InputError(f"--step-height must lie between 0 and 0.5 m, got {options.step_height:g}")
     choose_commands(options.commands, options.terrain)
     GroundConfig(options.terrain, options.density, options.level, options.seed, 1.0, 1.0)  # refuses what it cannot draw
     policies = [load_policy(name, options.device) for name in names]
@@ -94,5 +100,13 @@ def main(argv: list[str]) -> int:
         print_comparison(console, compared)
     else:
         print_figures(console, results[0])
+    if options.step:
+        from vinl.evaluation.step import cross_block, draw_steps
+        from vinl.evaluation.step_film import film_steps
+
+        ways = {name: cross_block(p, options.step_height) for name, p in zip(compared, policies, strict=True)}
+        draw_steps(ways, options.step_height, out / "step.png")
+        film_steps(ways, options.step_height, out / "step.mp4")
+        console.print(f"one block: {out / 'step.png'}, {out / 'step.mp4'}", soft_wrap=True)
     console.print(f"{results[0].wall_seconds:.0f} s; figures {out / 'results.json'}", soft_wrap=True)
     return 0

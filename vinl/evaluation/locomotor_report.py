@@ -59,8 +59,8 @@ def print_figures(console: Console, results: LocomotorResults) -> None:
 def print_comparison(console: Console, compared: Mapping[str, LocomotorResults]) -> None:
     """One row for each policy."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("policy", overflow="fold")
-    for title in (*[title for _, title, _ in _COLUMNS], "falls", "fell"):
+    table.add_column("policy", overflow="fold", min_width=9)
+    for title in (*[title for _, title, _ in _COLUMNS], "fell"):
         table.add_column(title, justify="right", no_wrap=True)
     for name, results in compared.items():
         a, cells = results.aggregate, []
@@ -68,7 +68,7 @@ def print_comparison(console: Console, compared: Mapping[str, LocomotorResults])
             interval = a["ci95"].get(key)
             spread = f" ±{(interval[1] - interval[0]) / 2:.{digits}f}" if interval and key in _SPREAD else ""
             cells.append("-" if a[key] is None else f"{a[key]:.{digits}f}{spread}")
-        table.add_row(name, *cells, str(a["fall_count"]), f"{100 * a['falls']:.1f} %")
+        table.add_row(name, *cells, f"{100 * a['falls']:.1f} %")
     console.print(table)
     _print_heights(console, compared)
 
@@ -78,12 +78,12 @@ def _print_heights(console: Console, compared: Mapping[str, LocomotorResults]) -
     if not any(key in results.aggregate for results in compared.values()):
         return
     table = Table(title="feet/m, legs/m on blocks, were all blocks so high [m]", box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("policy", overflow="fold")
+    table.add_column("policy", overflow="fold", min_width=9)
     for name in HEIGHT_NAMES:
         table.add_column(name, justify="right", no_wrap=True)
     for name, results in compared.items():
         rows = [results.aggregate[f"{limb}_block_per_m_by_height"] for limb in ("foot", "leg")]
-        table.add_row(name, *[", ".join("-" if r[h] is None else f"{r[h]:.2f}" for r in rows) for h in HEIGHT_NAMES])
+        table.add_row(name, *[", ".join("-" if r[h] is None else f"{r[h]:.3g}" for r in rows) for h in HEIGHT_NAMES])
     console.print(table)
 
 
