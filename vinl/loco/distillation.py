@@ -126,7 +126,8 @@ class Distillation:
                 self.optimizer.step()
                 totals += torch.stack([code_loss, action_loss, unexplained, norm]).detach()
         means = (totals / (c.epochs * parts)).tolist()
-        return dict(zip(("code", "action", "unexplained", "gradient_norm"), means, strict=True))
+        losses = dict(zip(("code", "action", "unexplained", "gradient_norm"), means, strict=True))
+        return {**losses, "teacher_share": self.teacher_share}
 
     def losses(self, robots: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Mean squared errors of the codes and of the actions for some robots' windows; the code's error as a share of

@@ -1,0 +1,146 @@
+"""What the student sees: the world that the evaluation has, a little off, late and with holes."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+import torch
+
+from vinl.loco.scenery import patch_mesh, terrain_mesh
+from vinl.loco.sight import Sight
+from vinl.loco.student_config import CameraConfig, SightConfig
+from vinl.robot.cameras import LOCOMOTION_CAMERA
+from vinl.world.grid import GridFrame
+from vinl.world.heightfield import GROUND
+from vinl.world.terrain import Terrain, TerrainConfig, build_terrain
+
+EXACT = SightConfig(position=0.0, angle=0.0, zoom=0.0, scale=0.0, noise=0.0, holes=0.0, delay=0.0)
+CAMERA = CameraConfig(width=16, height=16).record()
+
+
+@pytest.fixture(scope="module")
+def terrain() -> Terrain:
+    nothing = {"slope": 0.0, "rough_slope": 0.0, "stairs_up": 0.0, "stairs_down": 0.0, "discrete": 0.0}
+    return build_terrain(TerrainConfig(**nothing, blocks=1.0, levels=2, columns=1, joined=0.2))
+
+
+@pytest.fixture(scope="module")
+def poses(terrain) -> torch.Tensor:
+    """Trunks 0.9 m before blocks, any heading."""
+    rng = np.random.default_rng(0)
+    yaw = rng.uniform(-np.pi, np.pi, 6)
+    middle = terrain.blocks.rows[:6, :2] - 0.9 * np.column_stack([np.cos(yaw), np.sin(yaw)])
+    zero = np.zeros(6)
+    turn = [np.cos(yaw / 2), zero, zero, np.sin(yaw / 2)]
+    return torch.tensor(np.column_stack([middle, np.full(6, 0.36), *turn]), dtype=torch.float32)
+
+
+def see(terrain, config, poses, camera=CAMERA, seed=1, steps=0) -> torch.Tensor:
+    sight = Sight(terrain_mesh(terrain), camera, config, len(poses), "cpu", seed)
+    depth = sight.look(poses, None)
+    for _ in range(steps):
+        depth = sight.look(poses, torch.zeros(len(poses)))
+    return depth
+
+
+def test_the_student_sees_what_mujoco_has_in_its_way(terrain, poses):
+    """MuJoCo's rays against a plane and boxes, the ground of the evaluation."""
+    spec = mujoco.MjSpec()
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[100, 100, 1])
+    for x, y, yaw, length, width, bottom, top in (terrain.blocks.boxes() + terrain.tall).rows:
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=[x, y, (bottom + top) / 2],
+            size=[length / 2, width / 2, (top - bottom) / 2],
+            quat=[np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)],
+        )
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    tx, ty = CAMERA.tan_half
+    seen = see(terrain, EXACT, poses).float().numpy() * CAMERA.far
+    wrong, hits = 0, set()
+    for pose, image in zip(poses.numpy().astype(float), seen, strict=True):
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, pose[3:])
+        trunk = turn.reshape(3, 3)
+        place, camera = pose[:3] + trunk @ CAMERA.position, trunk @ CAMERA.rotation()
+        for i, j in np.ndindex(image.shape):
+            ray = camera @ [1.0, tx * (1 - (2 * j + 1) / 16), ty * (1 - (2 * i + 1) / 16)]
+            geom = np.array([-1], np.int32)
+            distance = mujoco.mj_ray(model, data, place, ray / np.linalg.norm(ray), None, 1, -1, geom, None)
+            depth = min(distance / np.linalg.norm(ray), CAMERA.far) if distance >= 0 else CAMERA.far
+            wrong += abs(depth - image[i, j]) > 0.004
+            hits.add(int(geom[0]))
+    assert wrong <= 0.003 * seen.size  # rays along an edge may pass on either side
+    assert len(hits) > 5
+
+
+def test_level_ground_is_coarse_and_rough_ground_is_not():
+    frame = GridFrame(0.0, 0.0, 0.05, (65, 97))
+    heights = np.zeros(frame.shape, np.float32)
+    assert len(patch_mesh(heights, frame)[1]) == 2 * 2 * 3
+    heights[3, 40] = 0.1
+    vertices, faces = patch_mesh(heights, frame)
+    assert len(faces) == 2 * 5 + 2 * 32 * 32 and vertices[:, 2].max() == np.float32(0.1)
+    area = 0.0
+    for a, b, c in vertices[faces][:, :, :2]:
+        area += ((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]) / 2
+    assert area == pytest.approx(64 * 96 * 0.05**2, rel=1e-4)  # no gap, no overlap, all normals up
+
+
+def test_the_bare_ground_has_no_blocks(terrain):
+    assert (terrain.ground.labels != GROUND).any()
+    vertices, _ = terrain_mesh(terrain)
+    ground = vertices[: len(vertices) - 8 * (len(terrain.blocks) + len(terrain.tall))]
+    assert np.abs(ground[:, 2]).max() == 0.0
+
+
+def test_a_late_image_is_the_last_one_and_an_episode_has_no_past(terrain, poses):
+    mesh, late = terrain_mesh(terrain), replace(EXACT, delay=1.0)
+    sight, prompt = (Sight(mesh, CAMERA, c, 6, "cpu", 1) for c in (late, EXACT))
+    moved = poses.clone()
+    moved[:, 2] += 0.05
+    first, now = prompt.look(poses, None), prompt.look(moved, torch.zeros(6))
+    assert torch.equal(sight.look(poses, None), first)
+    done = torch.zeros(6)
+    done[2] = 1
+    seen = sight.look(moved, done)
+    fresh = done.bool()
+    assert torch.equal(seen[fresh], now[fresh]) and torch.equal(seen[~fresh], first[~fresh])
+    assert not torch.equal(first, now)
+
+
+def test_noise_holes_and_offsets_differ_from_robot_to_robot_and_repeat_with_the_seed(terrain, poses):
+    same = poses[:1].expand(6, 7).contiguous()
+    exact = see(terrain, EXACT, same)
+    assert (exact == exact[0]).all() and exact.min() >= 0 and exact.max() <= 1 and exact.dtype == torch.float16
+    for name, value in (("position", 0.02), ("angle", 0.05), ("zoom", 0.1), ("scale", 0.1), ("noise", 0.05)):
+        seen = see(terrain, replace(EXACT, **{name: value}), same)
+        change = (seen - exact).float().abs().amax((1, 2))
+        assert (change > 0).all() and len(change.unique()) > 1, name
+    for reads, value in (("far", 1.0), ("zero", 0.0)):
+        seen = see(terrain, replace(EXACT, holes=0.5, hole_size=3, hole_reads=reads), same)
+        hole = seen != exact
+        assert 0.05 < hole.float().mean() < 0.5 and (seen[hole] == value).all()
+    config = SightConfig()
+    assert torch.equal(see(terrain, config, poses), see(terrain, config, poses))
+    assert not torch.equal(see(terrain, config, poses), see(terrain, config, poses, seed=2))
+    assert not torch.equal(see(terrain, config, poses), see(terrain, config, poses, steps=1))
+
+
+def test_a_resumed_sight_sees_the_same(terrain, poses):
+    mesh, config = terrain_mesh(terrain), SightConfig(delay=0.5)
+    one, two = (Sight(mesh, CAMERA, config, 6, "cpu", 1) for _ in range(2))
+    moved = poses + torch.tensor([0.0, 0.02, 0.03, 0, 0, 0, 0])
+    one.look(poses, None)
+    now = one.look(moved, torch.tensor([0, 1, 0, 0, 0, 0]))
+    two.load_state(one.save_state())
+    assert torch.equal(two.look(moved, None), now)
+    done = torch.tensor([0, 0, 1, 0, 0, 0])
+    assert torch.equal(two.look(poses, done), one.look(poses, done))
+
+
+def test_the_default_camera_is_the_robots():
+    assert CameraConfig().record() == LOCOMOTION_CAMERA

@@ -1,0 +1,223 @@
+"""Stage 3: it runs and goes on after a stop, refuses teachers that are none, and learns what it is shown."""
+
+import json
+import math
+import shutil
+from dataclasses import replace
+
+import jax
+import numpy as np
+import pytest
+import torch
+from tensordict import TensorDict
+
+from vinl.cli.app import main
+from vinl.config.errors import InputError
+from vinl.config.loader import load_config
+from vinl.loco import student as stage3
+from vinl.loco.config import LocoConfig
+from vinl.loco.distillation import Distillation
+from vinl.loco.environment import LocoEnvironment
+from vinl.loco.student_config import DistillationConfig, NetworkConfig, StudentConfig
+from vinl.policies.card import locomotion_card
+from vinl.policies.depth_policy import DepthPolicy
+from vinl.policies.io import find_policy, load_policy, save_policy
+from vinl.policies.networks import BlindActor, MapActor
+from vinl.rl.stopwatch import Stopwatch
+from vinl.robot.observation import OBSERVATION_SIZE
+
+SMALL = [
+    "num_envs=16",
+    "iterations=3",
+    "terrain.levels=2",
+    "terrain.columns=2",
+    "terrain.blocks=1",
+    "terrain.walls=0",
+    "terrain.rough_slope=0",
+    "terrain.discrete=0",
+    "student.camera.width=32",
+    "student.camera.height=18",
+    "student.distillation.steps=4",
+    "student.distillation.bptt=2",
+    "student.distillation.minibatches=2",
+]
+
+
+@pytest.fixture(scope="module")
+def env() -> LocoEnvironment:
+    return LocoEnvironment(load_config(LocoConfig, "loco/student", SMALL))
+
+
+@pytest.fixture
+def compiled_once(env, monkeypatch):
+    """Trainings share one environment: to compile it takes most of the time."""
+
+    def fresh(config: LocoConfig) -> LocoEnvironment:
+        env.state = jax.device_put(jax.jit(env._first_state)(jax.random.PRNGKey(config.seed)), jax.devices()[0])
+        return env
+
+    monkeypatch.setattr(stage3, "LocoEnvironment", fresh)
+
+
+def read_rows(folder):
+    return [json.loads(line) for line in (folder / "metrics.jsonl").read_text().splitlines()]
+
+
+def learned(folder):
+    return torch.load(folder / "checkpoint.pt", weights_only=True)["algorithm"]["student"]
+
+
+def test_it_trains_and_a_resumed_run_ends_with_the_very_same_weights(tmp_path, compiled_once):
+    straight, stopped, teacher = tmp_path / "straight", tmp_path / "stopped", tmp_path / "teacher"
+    shutil.copytree(find_policy("rough"), teacher)
+    steady = [f"student.distillation.{x}" for x in ("last_learning_rate=1e-3", "warmup=0", "teacher_share=0")]
+    command = ["train-loco", "--stage", "3", "--device", "cpu", "--from", str(teacher), *SMALL, *steady]
+    assert main([*command, "--out", str(straight)]) == 0
+    rows = read_rows(straight)
+    assert [row["iteration"] for row in rows] == [1, 2, 3]
+    assert all(np.isfinite(list(row.values())).all() for row in rows)
+    assert rows[-1]["samples"] == 3 * 16 * 4
+    assert {"seconds/simulate", "seconds/render", "seconds/network", "seconds/update"} <= set(rows[1])
+
+    policy = load_policy(straight)
+    assert isinstance(policy, DepthPolicy) and policy.camera is not None
+    assert (policy.camera.width, policy.camera.height) == (32, 18)
+    assert policy.card.training["origin"]["policy"] == "rough" and policy.card.samples == 192
+    frozen = load_policy("rough").network.state_dict()
+    assert all(torch.equal(w, frozen[k]) for k, w in policy.network.state_dict().items() if k.startswith("actor."))
+    action = policy.act(np.zeros((2, 48), np.float32), np.ones((2, 18, 32), np.float32))
+    assert action.shape == (2, 12) and np.isfinite(action).all()
+
+    assert main([*command, "--out", str(stopped), "--iterations", "2"]) == 0
+    shutil.rmtree(teacher)  # to resume needs nothing of the teacher that it started from
+    assert not all(torch.equal(learned(straight)[name], weight) for name, weight in learned(stopped).items())
+    assert main(["train-loco", "--device", "cpu", "--resume", str(stopped), "--iterations", "3"]) == 0
+    assert all(torch.equal(learned(straight)[name], weight) for name, weight in learned(stopped).items())
+    assert [row["iteration"] for row in read_rows(stopped)] == [1, 2, 3]
+
+
+def test_policies_that_cannot_teach_are_refused(tmp_path, capsys):
+    blind, student = tmp_path / "blind", tmp_path / "student"
+    network = BlindActor(actor=(8,))
+    save_policy(blind, network, locomotion_card("blind", network.describe()))
+    eyes = stage3.build_student(StudentConfig(), MapActor())
+    camera = StudentConfig().camera.record().describe()
+    save_policy(student, eyes, locomotion_card("student", eyes.describe(), scan=False, camera=camera))
+    for folder, words in ((blind, "without a map"), (student, "a student itself"), (tmp_path / "none", "unknown")):
+        command = ["train-loco", "--stage", "3", "--device", "cpu", "--from", str(folder), "--out", "out"]
+        assert main(command) == 2
+        error = capsys.readouterr().err
+        assert words in error and len(error.strip().splitlines()) == 1
+        assert not (tmp_path / "out").exists()
+    assert main(["train-loco", "--stage", "3", "--device", "cpu", "--out", "out", "from_policy=null"]) == 2
+    assert "needs a teacher" in capsys.readouterr().err
+    assert main(["train-loco", "--stage", "2", "--device", "cpu", "--from", str(student), "--out", "out"]) == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    ["bptt=5", "loss=none", "learning_rate=0", "teacher_share=2", "minibatches=0", "max_grad_norm=0"],
+)
+def test_bad_settings_are_refused(wrong):
+    with pytest.raises(InputError, match=wrong.split("=")[0]):
+        load_config(LocoConfig, "loco/student", [f"student.distillation.{wrong}"])
+
+
+def test_the_stage_decides_about_the_student():
+    assert load_config(LocoConfig, "loco/mlp").student == replace(
+        load_config(LocoConfig, "loco/student").student, network=NetworkConfig(memory="mlp")
+    )
+    with pytest.raises(InputError, match="stage 3"):
+        load_config(LocoConfig, "loco/teacher", ["student.camera.width=32"])
+
+
+def roll_out(algorithm: Distillation, n: int, steps: int) -> None:
+    """Steps of random numbers: nothing but the learner is looked at."""
+    with torch.inference_mode():
+        for k in range(steps):
+            observation = torch.randn(n, OBSERVATION_SIZE)
+            depth = torch.rand(n, 18, 32).half()
+            groups = {"policy": observation, "critic": observation, "depth": depth}
+            batch = TensorDict(groups, batch_size=[n])
+            algorithm.act(batch)
+            done = torch.zeros(n, dtype=torch.uint8)
+            done[k % n] = 1
+            algorithm.process_env_step(batch, torch.zeros(n), done, {})
+        algorithm.compute_returns(batch)
+
+
+def learner(memory: str = "lstm", n: int = 6, **settings) -> Distillation:
+    torch.manual_seed(0)
+    config = StudentConfig(
+        network=NetworkConfig(hidden=32, memory=memory, remember=5),
+        camera=replace(StudentConfig().camera, width=32, height=18),
+        distillation=DistillationConfig(**{"steps": 8, "bptt": 4, "minibatches": 2, **settings}),
+    )
+    teacher = MapActor(encoder=(16,), code=8, actor=(16,))
+    student = stage3.build_student(config, teacher)
+    return Distillation(student, teacher, config.distillation, n, "cpu", Stopwatch("cpu"))
+
+
+@pytest.mark.parametrize("loss", ["code", "action", "both"])
+def test_the_loss_falls_on_a_roll_out_and_the_actor_stays(loss):
+    algorithm = learner(loss=loss, learning_rate=3e-3, warmup=0.0, epochs=10)
+    actor = {name: w.clone() for name, w in algorithm.student.actor.state_dict().items()}
+    assert all(torch.equal(w, actor[name]) for name, w in algorithm.teacher.actor.state_dict().items())
+    roll_out(algorithm, 6, 8)
+    first = algorithm.update()
+    for _ in range(4):
+        last = algorithm.update()
+    name = "action" if loss == "action" else "code"
+    assert last[name] < 0.8 * first[name]
+    assert all(torch.equal(w, actor[k]) for k, w in algorithm.student.actor.state_dict().items())
+
+
+@pytest.mark.parametrize("memory", ["lstm", "mlp"])
+def test_windows_begin_with_the_memory_that_the_roll_out_had(memory):
+    """Without an update in between, the windows say what the roll-out said, whatever their length."""
+    errors = []
+    for bptt in (1, 2, 8):
+        algorithm = learner(memory, bptt=bptt)
+        torch.manual_seed(1)
+        roll_out(algorithm, 6, 8)
+        roll_out(algorithm, 6, 8)  # the second begins with what the first left
+        errors.append(algorithm.losses(torch.arange(6))[0].item())
+    assert errors == pytest.approx([errors[0]] * 3, rel=1e-5)
+
+
+def test_the_teacher_drives_a_share_of_the_robots():
+    algorithm = learner(n=4)
+    observation = torch.randn(4, OBSERVATION_SIZE)
+    groups = {"policy": observation, "critic": observation, "depth": torch.rand(4, 18, 32).half()}
+    algorithm.teacher_share = 0.5
+    with torch.inference_mode():
+        action = algorithm.act(TensorDict(groups, batch_size=[4]))
+        same = torch.isclose(action, algorithm.teacher(observation), atol=1e-6).all(1)
+    assert same.tolist() == [True, True, False, False]
+
+
+def test_schedules():
+    config = DistillationConfig(
+        learning_rate=1e-3, last_learning_rate=1e-5, warmup=0.1, teacher_share=0.8, teacher_until=0.5
+    )
+    rates = [config.rate_at(s) for s in (0.0, 0.1, 0.5, 1.0)]
+    assert rates[0] < 1e-4 < rates[1] and rates[2] == pytest.approx(5.05e-4) and rates[3] == pytest.approx(1e-5)
+    assert [config.teacher_share_at(s) for s in (0.0, 0.25, 0.5, 0.9)] == pytest.approx([0.8, 0.4, 0.0, 0.0])
+    assert DistillationConfig(teacher_until=0.0).teacher_share_at(0.0) == 0.0
+
+
+def test_cells_that_are_told_to_remember_do():
+    """The gradient from the last step reaches back some twenty steps."""
+    reach = []
+    for steps in (0, 50):
+        torch.manual_seed(0)
+        config = StudentConfig(network=NetworkConfig(vision="none", remember=steps))
+        student = stage3.build_student(config, MapActor())
+        vector = torch.randn(25, 1, 48, requires_grad=True)
+        code, _ = student.encode(None, vector, student.initial_state(1), torch.zeros(25, 1).bool())
+        code[-1].norm().backward()
+        assert vector.grad is not None
+        norms = vector.grad.norm(dim=2)[:, 0]
+        reach.append((norms[0] / norms[-1]).item())
+    assert reach[0] < 1e-3 < 1e-2 < reach[1] and math.isfinite(reach[1])
