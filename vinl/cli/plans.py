@@ -1,16 +1,19 @@
-"""``vinl plans``: list the shipped floor plans, or look at any plan."""
+"""``vinl plans``: list the shipped floor plans, look at any plan, make up homes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
+import tyro
 from tyro.conf import Positional
 
 from vinl.config.errors import InputError
 
-USAGE = """usage: vinl plans list             the floor plans that travel with the package
-       vinl plans show PATH ...    read a plan and draw it from above (vinl plans show --help)"""
+USAGE = """usage: vinl plans list                    the floor plans that travel with the package
+       vinl plans show PATH ...           read a plan and draw it from above (vinl plans show --help)
+       vinl plans generate --out DIR ...  make up homes, one file each (vinl plans generate --help)"""
 
 
 @dataclass(frozen=True)
@@ -18,7 +21,8 @@ class ShowPlan:
     """Read a floor plan and draw it from above."""
 
     path: Positional[str]
-    """PNG, PGM, ROS map YAML, ProcTHOR JSON (file.jsonl.gz:17 for one of many) or the name of a shipped plan."""
+    """PNG, PGM, ROS map YAML, JSON of ProcTHOR, HouseExpo or vectors (file.jsonl.gz:17 for one of many), mesh (GLB,
+    OBJ, PLY, STL) or the name of a shipped plan."""
     out: Path | None = None
     """PNG file for the picture; not drawn if left away."""
     resolution: float | None = None
@@ -34,12 +38,30 @@ class ShowPlan:
 
 
 @dataclass(frozen=True)
+class GeneratePlans:
+    """Make up homes: rooms, doors and furniture from a seed, one JSON file each, and a picture of all of them."""
+
+    out: Path
+    """Folder for home-SEED.json, and contact.png with all homes in it."""
+    count: int = 20
+    """How many homes."""
+    seed: int = 0
+    """Seed of the first home; the others follow. The same seed gives the same home."""
+    config: Path | None = None
+    """YAML file of what homes are like (area, door_width, furniture_density, ...: see docs/floorplans.md)."""
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="KEY=VALUE")] = ()
+    """Settings of the config, for example area=[60,90] furniture_density=[0,0]."""
+    picture: bool = True
+    """Draw contact.png: at most the first 100 homes."""
+
+
+@dataclass(frozen=True)
 class ListPlans:
     """List the floor plans that travel with the package."""
 
 
 def main(argv: list[str]) -> int:
-    """Run ``vinl plans show PATH`` or ``vinl plans list``.
+    """Run ``vinl plans show PATH``, ``vinl plans generate`` or ``vinl plans list``.
 
     Raises:
         InputError: if the plan or an option cannot be used.
@@ -49,13 +71,15 @@ def main(argv: list[str]) -> int:
     what = argv[0] if argv else "--help"
     if what == "show":
         _show_plan(parse_options(ShowPlan, argv[1:], "plans show"))
+    elif what == "generate":
+        _generate_plans(parse_options(GeneratePlans, argv[1:], "plans generate"))
     elif what == "list":
         parse_options(ListPlans, argv[1:], "plans list")
         _list_plans()
     elif what in ("-h", "--help"):
         print(USAGE)
     else:
-        raise InputError(f"vinl plans {what}: choose 'show' or 'list' (vinl plans --help)")
+        raise InputError(f"vinl plans {what}: choose 'show', 'generate' or 'list' (vinl plans --help)")
     return 0
 
 
@@ -65,6 +89,29 @@ def _list_plans() -> None:
     for name in shipped_floorplans():
         plan = load_floorplan(name)
         print(f"{name:16} {plan.area_m2:5.0f} m2 free, {len(plan.labels):2} rooms, {len(plan.furniture):3} furniture")
+
+
+def _generate_plans(options: GeneratePlans) -> None:
+    from vinl.config.loader import build_config, load_config
+    from vinl.world.drawing import save_contact_sheet
+    from vinl.world.homes import HomeConfig, generate_home
+    from vinl.world.writer import write_floorplan
+
+    if options.count < 1:
+        raise InputError(f"--count {options.count}: give a number, 1 or more")
+    if options.seed < 0:
+        raise InputError(f"--seed {options.seed}: give a number, 0 or more")
+    if options.config is None:
+        config = build_config(HomeConfig, {}, options.set, source="--set")
+    else:
+        config = load_config(HomeConfig, options.config, options.set)
+    plans = [generate_home(options.seed + k, config) for k in range(options.count)]
+    for plan in plans:
+        write_floorplan(plan, options.out / f"{plan.name}.json")
+    areas = [plan.area_m2 for plan in plans]
+    print(f"{len(plans)} homes in {options.out}, {min(areas):.0f} to {max(areas):.0f} m2 of free floor")
+    if options.picture:
+        print(f"  picture   {save_contact_sheet(plans[:100], options.out / 'contact.png')}")
 
 
 def _show_plan(options: ShowPlan) -> None:

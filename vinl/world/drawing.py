@@ -107,16 +107,37 @@ def save_floorplan(plan: FloorPlan, out: str | Path, dpi: int = 100, **drawn) ->
     Raises:
         InputError: if the file cannot be written.
     """
+    return _save(draw_floorplan(plan, **drawn), out, dpi)
+
+
+def _save(figure: Figure, out: str | Path, dpi: int) -> Path:
     out = Path(out)
     if out.suffix.lower() != ".png":
         raise InputError(f"--out {out}: give a name that ends in .png")
-    figure = draw_floorplan(plan, **drawn)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(out, dpi=dpi)
     except OSError as error:
         raise InputError(f"--out {out}: cannot be written ({error.strerror}); choose another place") from None
     return out
+
+
+def save_contact_sheet(plans: Sequence[FloorPlan], out: str | Path, columns: int = 5, dpi: int = 80) -> Path:
+    """Draw many plans beside one another, each to its own scale, and save them as one PNG.
+
+    Raises:
+        InputError: if the file cannot be written, or there are no plans.
+    """
+    from matplotlib.figure import Figure
+
+    if not plans:
+        raise InputError("a contact sheet needs at least one plan")
+    columns = min(columns, len(plans))
+    rows = -(-len(plans) // columns)
+    figure = Figure(figsize=(3.6 * columns, 3.3 * rows), layout="constrained")
+    for k, plan in enumerate(plans):
+        draw_floorplan(plan, figure.add_subplot(rows, columns, k + 1), title=f"{plan.name}: {plan.area_m2:.0f} m²")
+    return _save(figure, out, dpi)
 
 
 def _add_scale_bar(axes: Axes, extent: tuple[float, float, float, float]) -> None:

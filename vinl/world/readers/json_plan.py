@@ -10,6 +10,8 @@ from typing import Any
 
 from vinl.config.errors import InputError
 from vinl.world.floorplan import FloorPlan
+from vinl.world.readers.boxes_plan import SCHEMA as BOXES_SCHEMA
+from vinl.world.readers.boxes_plan import build_boxes_plan
 from vinl.world.readers.own import SCHEMA, build_own_plan
 from vinl.world.readers.procthor import build_procthor_plan
 
@@ -31,8 +33,11 @@ def read_json_plan(file: Path, index: int | None) -> FloorPlan:
     source = f"{file}:{index or 0}" if several else str(file)
     try:
         if house.get("schema") is not None:
+            if house["schema"] == BOXES_SCHEMA:
+                return build_boxes_plan(house, name, source)
             if house["schema"] != SCHEMA:
-                raise InputError(f"{source}: unknown schema '{house['schema']}'; this version reads '{SCHEMA}'")
+                known = f"'{SCHEMA}' and '{BOXES_SCHEMA}'"
+                raise InputError(f"{source}: unknown schema '{house['schema']}'; this version reads {known}")
             return build_own_plan(house, name, source)
         if "rooms" not in house or "walls" not in house:
             raise InputError(f"{source}: not a floor plan; a ProcTHOR house has 'rooms' and 'walls'")
