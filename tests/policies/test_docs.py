@@ -18,9 +18,11 @@ def test_observation_table_is_that_of_the_code():
 
 
 def test_code_on_the_page_runs(tmp_path: Path):
-    use, save = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    use, save, see = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     names = {"vinl": vinl}
     exec(save, names)
     assert (tmp_path / "my_policy" / "card.json").exists()
     exec(use.replace("vinl/rough", "my_policy"), names)
+    exec(see, names)
+    assert vinl.load_policy("moth").camera == names["camera"]
     assert isinstance(names["actions"], np.ndarray) and names["actions"].shape == (8, 12)

@@ -111,7 +111,8 @@ def check_policy() -> str:
         LocomotionPolicy(network, locomotion_card("untrained", network.describe()))
     ]
     for policy in policies:
-        action = policy.act(np.zeros((2, policy.card.observation_size), np.float32))
+        zeros, camera = np.zeros((2, policy.card.observation_size), np.float32), policy.camera
+        action = policy.act(zeros, None if camera is None else np.ones((2, camera.height, camera.width), np.float32))
         if not np.isfinite(action).all():
             raise RuntimeError(f"{policy.card.name} acts {action}")
     return f"{', '.join(names)} act" if names else "none is shipped; an untrained network acts"

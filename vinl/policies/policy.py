@@ -53,12 +53,12 @@ class LocomotionPolicy:
     def reset(self, which: int | Bool[np.ndarray, " n"] | Bool[Tensor, " n"]) -> None:
         """This policy has no memory: nothing to forget."""
 
-    def act(self, observation: Float[A, "n observation"], depth: None = None) -> Float[A, "n actions"]:
+    def act(self, observation: Float[A, "n observation"], depth: Any = None) -> Float[A, "n actions"]:
         """Actions for scaled observations.
 
         Args:
             observation: (n, 235) in the order of the card's observation table, numpy or torch, any float type.
-            depth: this policy has no camera.
+            depth: left alone: this policy has no camera.
 
         Returns:
             (n, 12) of the same kind and on the same device; numpy as float32.
