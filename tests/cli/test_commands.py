@@ -61,7 +61,7 @@ def test_count():
         (["policies", "--jsn"], "Unrecognized options: --jsn, did you mean --json? (vinl policies --help"),
         (["policies", "assets"], "assets is no policy folder: card.json is missing"),
         (["policies", "a", "b"], "Unrecognized options: b"),
-        (["bench", "nothing"], "there is no benchmark 'nothing'; choose loco or depth"),
+        (["bench", "nothing"], "there is no benchmark 'nothing'; choose loco, nav or depth"),
         (["bench", "loco", "--num-envs", "-4"], "--num-envs must be positive, got -4"),
         (["bench", "loco", "--seconds", "many"], "Error parsing --seconds"),
         (["bench", "loco", "--device", "gpu"], "unknown device 'gpu'; use cpu"),

@@ -1,11 +1,11 @@
-"""``vinl bench``: how fast training physics and the depth camera run on this machine."""
+"""``vinl bench``: how fast the two training environments and the depth camera run on this machine."""
 
 from __future__ import annotations
 
 import json
 import os
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from rich.console import Console
 from rich.table import Table
@@ -51,11 +51,31 @@ class DepthOptions:
     """Print JSON instead of a table."""
 
 
+@dataclass(frozen=True)
+class NavOptions:
+    """Steps per second of the navigation environment with a depth image each, and what its homes cost."""
+
+    num_envs: int | None = None
+    """Robots in parallel (default: 4096 on a GPU, 32 on a CPU)."""
+    homes: int | None = None
+    """Homes that the robots are spread over (default: 1000 on a GPU, 16 on a CPU)."""
+    seconds: float = 5.0
+    """How long to measure [s]."""
+    config: str = "nav/default"
+    """Name of a shipped config or a YAML file."""
+    tree: Literal["sah", "lbvh"] | None = None
+    """How the ray trees of the homes are built: sah on the host, lbvh on a GPU (default: Warp's choice)."""
+    device: str = "auto"
+    """cpu, cuda, or auto: cuda where there is one."""
+    json: bool = False
+    """Print JSON instead of a table."""
+
+
 def main(argv: list[str]) -> int:
-    """Measure one of the two and print its figures."""
+    """Measure one of the three and print its figures."""
     what = argv[0] if argv else "--help"
     if what in ("-h", "--help"):
-        print("usage: vinl bench loco|depth [OPTIONS]\n\nvinl bench loco --help and vinl bench depth --help list them.")
+        print("usage: vinl bench loco|nav|depth [OPTIONS]\n\nvinl bench loco --help and so on list them.")
         return 0
     if what == "loco":
         options = parse_options(LocoOptions, argv[1:], "bench loco")
@@ -63,8 +83,11 @@ def main(argv: list[str]) -> int:
     elif what == "depth":
         options = parse_options(DepthOptions, argv[1:], "bench depth")
         figures = _bench_depth(options)
+    elif what == "nav":
+        options = parse_options(NavOptions, argv[1:], "bench nav")
+        figures = _bench_nav(options)
     else:
-        raise InputError(f"there is no benchmark {what!r}; choose loco or depth")
+        raise InputError(f"there is no benchmark {what!r}; choose loco, nav or depth")
     _print(figures, what, options.json)
     return 0
 
@@ -81,6 +104,20 @@ def _bench_loco(options: LocoOptions) -> dict[str, Any]:
     from vinl.loco.benchmark import run_loco
 
     return run_loco(options.num_envs, options.seconds, config)
+
+
+def _bench_nav(options: NavOptions) -> dict[str, Any]:
+    for option in ("num_envs", "homes", "seconds"):
+        _refuse(getattr(options, option), f"--{option.replace('_', '-')}")
+    device = _device(options.device)
+    if device == "cpu" and options.tree == "lbvh":
+        raise InputError("--tree lbvh builds on a GPU; use sah on a CPU")
+    from vinl.config.loader import load_config
+    from vinl.nav.benchmark import run_nav
+    from vinl.nav.config import NavConfig
+
+    config = load_config(NavConfig, options.config)
+    return run_nav(options.num_envs, options.homes, options.seconds, device, config, options.tree)
 
 
 def _bench_depth(options: DepthOptions) -> dict[str, Any]:

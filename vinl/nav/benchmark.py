@@ -1,0 +1,97 @@
+"""How fast the navigation environment steps, images included, and what its homes cost."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import torch
+
+from vinl.config.errors import InputError
+from vinl.config.loader import load_config
+from vinl.nav.config import NavConfig
+from vinl.nav.environment import NavEnvironment
+from vinl.nav.home_store import HomeStore
+
+
+def run_nav(
+    num_envs: int | None = None,
+    homes: int | None = None,
+    seconds: float = 5.0,
+    device: str = "cpu",
+    config: NavConfig | None = None,
+    tree: str | None = None,
+) -> dict[str, Any]:
+    """Step the environment with random actions, a depth image a step.
+
+    Args:
+        num_envs: robots in parallel; 4096 on a GPU and 32 on a CPU by default.
+        homes: how many; 1000 on a GPU and 16 on a CPU by default.
+        seconds: of measuring, after a warm-up.
+        device: ``"cpu"``, ``"cuda"`` or ``"cuda:0"``.
+        config: defaults to ``nav/default``.
+        tree: how ray trees are built, see ``HomeStore``.
+
+    Returns:
+        ``steps_per_second`` of all robots, ``blind_steps_per_second`` of the same without images,
+        ``homes_per_second`` built (by all workers, distance fields included), ``home_kilobytes`` of grids and triangles
+        on the device for each home, ``device_gigabytes`` in use by all (GPU only), and what was measured.
+
+    Raises:
+        InputError: a number is not positive, or the device is not there.
+    """
+    on_gpu = device.startswith("cuda")
+    num_envs = (4096 if on_gpu else 32) if num_envs is None else num_envs
+    homes = (1000 if on_gpu else 16) if homes is None else homes
+    for name, value in {"num_envs": num_envs, "homes": homes, "seconds": seconds}.items():
+        if not value > 0:
+            raise InputError(f"bench nav: {name} must be positive, got {value}")
+    config = config or load_config(NavConfig, "nav/default")
+    config = replace(config, num_envs=num_envs, homes=replace(config.homes, count=homes))
+    used = _device_bytes(device)
+    begin = time.perf_counter()
+    store = HomeStore.build(config, device, tree=tree)
+    built = time.perf_counter() - begin
+    camera = config.camera
+    figures: dict[str, Any] = {
+        "steps_per_second": _measure(NavEnvironment(config, store, device), seconds),
+        "blind_steps_per_second": _measure(NavEnvironment(replace(config, camera=None), store, device), seconds / 2),
+        "homes_per_second": (homes + store.dropped) / built,
+        "home_kilobytes": store.memory_bytes / homes / 1e3,
+        "homes": homes,
+        "dropped": store.dropped,
+        "num_envs": num_envs,
+        "image": "none" if camera is None else f"{camera.width} x {camera.height}",
+        "device": torch.cuda.get_device_name(device) if on_gpu else "cpu",
+    }
+    if on_gpu:
+        figures["device_gigabytes"] = (_device_bytes(device) - used) / 1e9
+    store.close()
+    return figures
+
+
+def _measure(environment: NavEnvironment, seconds: float) -> float:
+    """Steps of all robots in a second."""
+    n, device = environment.num_envs, environment.device
+    generator = torch.Generator().manual_seed(0)
+    # mostly forward, turning slowly: robots get about instead of standing at walls
+    actions = [(torch.randn(n, 2, generator=generator) * 0.5 + torch.tensor([0.4, 0.0])).to(device) for _ in range(8)]
+    for k in range(5):
+        environment.step(actions[k])
+    environment.read_measures()
+    count, start = 0, time.perf_counter()
+    while (passed := time.perf_counter() - start) < seconds or not count:
+        for k in range(24):  # as many as a roll-out: one wait for the device in 24 steps
+            environment.step(actions[k % 8])
+        environment.read_measures()
+        count += 24
+    return count * n / passed
+
+
+def _device_bytes(device: str) -> int:
+    """In use on the GPU, Warp's and torch's; 0 on a CPU."""
+    if not device.startswith("cuda"):
+        return 0
+    free, total = torch.cuda.mem_get_info(device)
+    return total - free
