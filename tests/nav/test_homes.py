@@ -1,0 +1,106 @@
+"""Distance fields, the building of homes, their exchange while robots drive."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from vinl.config.errors import InputError
+from vinl.nav.config import ClutterConfig, EpisodeConfig, HomesConfig, NavConfig
+from vinl.nav.environment import NavEnvironment
+from vinl.nav.fields import measure_near_clearance, spread_fields
+from vinl.nav.home_builder import build_home, prepare_home
+from vinl.nav.home_store import HomeStore
+from vinl.nav.home_stream import HomeStream
+from vinl.world.floorplan import measure_clearance
+from vinl.world.geodesic import distance_field
+from vinl.world.grid import GridFrame
+from vinl.world.readers import load_floorplan
+
+
+def test_fields_agree_with_those_of_the_world():
+    plan = load_floorplan("old_town")
+    clearance = measure_near_clearance(plan.free, 0.05, 0.6)
+    exact = measure_clearance(plan.free, 0.05)
+    np.testing.assert_allclose(np.minimum(clearance, 0.6), np.minimum(exact, 0.6), atol=1e-3)
+    coarse = clearance[::2, ::2]
+    mask = np.where(coarse >= 0.22, 2, np.where(coarse >= 0.12, 1, 0)).astype(np.uint8)
+    goals = np.argwhere(mask == 2)[[5, 700]]
+    fields = spread_fields(mask, goals, 0.1)
+    for k, goal in enumerate(goals):
+        assert fields[goal[0], goal[1], k] == 0
+        frame = GridFrame(0.0, 0.0, 0.1, mask.shape)
+        other = distance_field(mask == 2, frame, frame.xy(goal))
+        known = np.isfinite(other) & (mask == 2)
+        assert (np.isfinite(fields[..., k]) == known)[mask == 2].all()
+        ratio = fields[..., k][known].astype(float) / np.maximum(other[known], 0.1)
+        assert ratio[other[known] > 1].min() > 0.97 and ratio.max() < 1.08
+
+
+def test_generated_homes_are_the_same_from_their_seed(config):
+    config = replace(config, clutter=ClutterConfig(share=1.0))
+    first, again, other = (build_home(seed, config) for seed in (5, 5, 6))
+    assert not isinstance(first, str) and not isinstance(again, str) and not isinstance(other, str)
+    assert (first.fields == again.fields).all() and (first.vertices == again.vertices).all()
+    assert first.fields.shape != other.fields.shape or (first.fields != other.fields).any()
+    assert first.clearance.shape == (2 * first.fields.shape[0], 2 * first.fields.shape[1])
+    assert len(first.blocks) > 3 and first.blocks[:, 5].max() <= 0.2
+
+
+def test_a_home_without_a_path_is_dropped_and_counted(config):
+    far = replace(config, episodes=EpisodeConfig(distance=(300.0, 400.0)))
+    plan = load_floorplan("harbour_flat")
+    why = prepare_home(plan, 1, far)
+    assert isinstance(why, str) and "hardly any way" in why
+    with pytest.raises(InputError, match="300 m to 400 m"):
+        HomeStore.from_plans([plan], far)
+    near = replace(config, episodes=EpisodeConfig(distance=(17.0, 30.0)))  # only the largest homes
+    seeds = [build_home(seed, near) for seed in range(1, 30)]
+    kept = [home.seed for home in seeds if not isinstance(home, str)][:2]
+    store = HomeStore.build(replace(near, homes=replace(near.homes, count=2)))
+    assert [record.seed for record in store.records] == kept
+    assert store.dropped == kept[-1] - 2 > 0
+
+
+def test_robots_of_a_replaced_home_begin_anew(config):
+    store = HomeStore.from_plans([load_floorplan("harbour_flat"), load_floorplan("old_town")], config)
+    environment = NavEnvironment(config, store)
+    inside = environment.state["home"] == 0
+    still = torch.tensor([[-1.0, 0.0]]).expand(32, 2)
+    saved = environment.save_state()
+    home = prepare_home(load_floorplan("harbour_flat"), 99, config)
+    assert not isinstance(home, str) and store.replace(home)
+    assert store.records[0].seed == 99 and store.replaced == 1
+    step = environment.step(still)
+    assert (step.done == inside).all() and (step.timeout == inside).all() and (step.reward[inside] == 0).all()
+    assert not environment.step(still).done.any()
+    measures = environment.read_measures()
+    assert measures["evicted"] == inside.sum() and measures["episodes"] == 0
+    environment.load_state(saved)  # of other homes: all begin anew
+    assert not environment.step(still).done.any()
+
+
+def test_homes_are_built_beside_the_training(config):
+    homes = HomesConfig(count=2, workers=1, goals=4, starts=64, fresh=500.0)
+    small = replace(config, homes=homes, num_envs=4)
+    store = HomeStore.build(small)
+    alone = HomeStream(small, 1, 0)
+    expected = [home for home in (alone.next(), alone.next()) if not isinstance(home, str)]
+    assert [record.seed for record in store.records][: len(expected)] == [home.seed for home in expected]
+    environment = NavEnvironment(small, store)
+    assert store._stream is not None
+    store._stream._waiting[0].result(timeout=120)
+    before = store.replaced + store.skipped
+    environment.step(torch.zeros(4, 2))
+    assert store.replaced + store.skipped > before
+    store.close()
+
+
+def test_settings_are_checked():
+    with pytest.raises(InputError, match=r"homes\.plans names no floor plan"):
+        HomesConfig(plans_share=0.5)
+    with pytest.raises(InputError, match=r"episodes\.distance"):
+        EpisodeConfig(distance=(5.0, 2.0))
+    with pytest.raises(InputError, match="num_envs"):
+        NavConfig(num_envs=0)

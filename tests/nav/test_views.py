@@ -1,0 +1,112 @@
+"""What the robots see, held to the depth camera; the reward, held to its formula."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from vinl.nav.config import CameraConfig, EpisodeConfig, MotionConfig, RewardConfig, ViewConfig
+from vinl.nav.environment import NavEnvironment
+from vinl.sensing.depth import DepthCamera
+from vinl.world.mesh import floorplan_mesh
+from vinl.world.readers import load_floorplan
+
+PLANS = ("harbour_flat", "old_town")
+
+
+@pytest.mark.parametrize("pitch", [0.0, -0.26])
+def test_images_are_those_of_the_depth_camera(config, homes, pitch):
+    lens = CameraConfig(width=16, height=12, pitch_down=pitch)
+    config = replace(config, camera=lens, view=ViewConfig(ceiling_share=1.0, ceiling=(2.7, 2.7)))
+    environment = NavEnvironment(config, homes)
+    depth, _ = environment.observe()
+    state = environment.state
+    meshes = [floorplan_mesh(load_floorplan(name), ceiling=2.7) for name in PLANS]
+    camera = DepthCamera(meshes, lens.record())
+    yaw = state["yaw"].double().numpy()
+    c, s, zero, one = np.cos(yaw), np.sin(yaw), np.zeros(32), np.ones(32)
+    rotation = np.stack([c, -s, zero, s, c, zero, zero, zero, one], -1).reshape(32, 3, 3)
+    trunk = np.column_stack([state["position"].numpy(), np.full(32, 0.36)])
+    expected = lens.record().normalise(camera.render(state["home"].numpy(), trunk, rotation))
+    close = (depth.float() - expected).abs() < 2e-3
+    assert close.float().mean() > 0.995  # a ray along an edge may see either side
+
+
+def test_camera_moves_as_told(config, homes):
+    def look(**motion):
+        settings = replace(config, num_envs=400, motion=MotionConfig(**motion))
+        environment = NavEnvironment(settings, homes)
+        environment.observe()
+        return environment._eye[0].clone(), environment._eye[1][:, 2, 0].asin(), environment
+
+    place, pitch, _ = look()
+    assert pitch.abs().max() < 1e-6 and (place[:, 2] - 0.36).abs().max() < 1e-6
+    _, pitch, environment = look(shake=0.05)
+    assert pitch.std().item() == pytest.approx(0.05, rel=0.15)
+    environment.step(torch.zeros(400, 2))
+    environment.observe()
+    assert np.corrcoef(pitch, environment._eye[1][:, 2, 0].asin())[0, 1] < 0.3
+    place, pitch, environment = look(offset=0.07, height_offset=0.03)
+    assert 0.06 < pitch.abs().max() <= 0.0701
+    # pitched up by the trunk, a camera 0.35 m ahead rises
+    assert (place[:, 2] - 0.36 - 0.35 * pitch.sin()).abs().max() < 0.0301
+    step = environment.step(torch.tensor([[-1.0, 0.0]]).expand(400, 2))
+    environment.observe()
+    kept = ~step.done
+    torch.testing.assert_close(environment._eye[1][kept, 2, 0].asin(), pitch[kept], atol=1e-5, rtol=0)
+    place, pitch, _ = look(uniform=math.pi / 6, with_trunk=False)
+    assert pitch.std().item() == pytest.approx(math.pi / 6 / math.sqrt(3), rel=0.1)
+    assert (place[:, 2] - 0.36).abs().max() < 1e-6
+
+
+def test_noise_and_holes(config, homes):
+    clean, _ = NavEnvironment(config, homes).observe()
+    noisy, _ = NavEnvironment(replace(config, view=ViewConfig(noise=0.02)), homes).observe()
+    middle = (clean > 0.05) & (clean < 0.9)
+    assert (noisy[middle].float() / clean[middle].float()).std().item() == pytest.approx(0.02, rel=0.2)
+    holes, _ = NavEnvironment(replace(config, view=ViewConfig(dropout=0.4)), homes).observe()
+    share = ((holes == 1) & (clean < 0.9)).float().mean()
+    assert 0.1 < share < 0.3
+
+
+def test_reward_is_progress_and_the_goal_ends_the_episode(config, homes):
+    rewards = RewardConfig(success=10.0, progress=1.0, slack=-0.002, collision=-0.003, scale=0.2)
+    config = replace(config, num_envs=200, camera=None, reward=rewards, episodes=EpisodeConfig(distance=(1.0, 6.0)))
+    environment = NavEnvironment(config, homes)
+    total, successes = 0.0, 0
+    for _ in range(60):
+        before, start = environment.distance.clone(), environment.state["start_distance"].clone()
+        _, vector = environment.observe()
+        # towards the goal as the crow flies
+        bearing = torch.atan2(vector[:, 2], vector[:, 1])
+        action = torch.stack([torch.where(bearing.abs() < 0.6, 1.0, -1.0), (bearing / 0.52).clamp(-1, 1)], 1)
+        reward, done, timeout = environment.advance(action)
+        ended, blocked = environment.ended, environment._blocked
+        success = done & ~timeout
+        expected = 0.2 * (before - environment.distance - 0.002 - 0.003 * blocked + 10.0 * success)
+        torch.testing.assert_close(reward, expected)
+        near = (environment.goals() - environment.state["position"]).norm(dim=1)
+        assert (near[success] < 0.325).all() and (ended.success[done] == success[done].float()).all()
+        assert (ended.spl[done] <= 1).all() and (ended.spl[done] >= 0).all()
+        torch.testing.assert_close(ended.start_distance[done], start[done])
+        successes += int(success.sum())
+        total += float(done.sum())
+        environment.restart(done)
+    assert successes > 30
+    measures = environment.read_measures()
+    assert measures["episodes"] == total and measures["success"] == pytest.approx(successes / total)
+    reasons = measures["stuck"] + measures["looping"] + measures["out_of_time"]
+    assert reasons == pytest.approx(1 - measures["success"])
+
+
+def test_the_shortest_way_is_free_of_cost(config, homes):
+    """Who follows the distance field makes good nearly what it moves."""
+    config = replace(config, num_envs=64, camera=None, episodes=EpisodeConfig(distance=(3.0, 20.0)))
+    environment = NavEnvironment(config, homes)
+    before = environment.distance.clone()
+    moved = environment.state["position"].clone()
+    environment.advance(torch.tensor([[1.0, 0.0]]).expand(64, 2))
+    way = (environment.state["position"] - moved).norm(dim=1)
+    assert ((before - environment.distance).abs() <= 1.09 * way + 0.03).all()
