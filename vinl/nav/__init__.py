@@ -1,1 +1,1 @@
-"""The 2 Hz navigator. Empty so far: evaluations are driven by the oracle in ``vinl.evaluation``."""
+"""The 2 Hz navigator: homes, kinematic environment, training; ``vinl.nav.gym`` registers it with gymnasium."""

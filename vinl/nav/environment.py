@@ -231,6 +231,7 @@ class NavEnvironment:
         if seed is not None:
             mixed = int(np.random.SeedSequence(seed).generate_state(1)[0]) >> 1
             self.state["chance"].copy_(torch.tensor([mixed, 0], dtype=torch.int32))
+        self.state["chance"][1] += 1
         self._start(torch.ones(self.num_envs, dtype=torch.bool, device=self.device) if chosen is None else chosen)
 
     def place(
