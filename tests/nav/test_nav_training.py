@@ -58,6 +58,7 @@ def test_shipped_configs_can_be_trained(config, tmp_path):
         "homes.starts=8",
         "ppo.steps=2",
         "ppo.epochs=1",
+        "ppo.minibatches=2",
         "network.planes=16",
     ]
     image = [] if config == "blind" else ["camera.width=32", "camera.height=24"]

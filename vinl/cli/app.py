@@ -12,6 +12,7 @@ from vinl.config.errors import InputError
 COMMANDS = {
     "eval": ("vinl.cli.eval", "the whole chain in MuJoCo: a robot crosses floor plans; report, figures, video"),
     "eval-loco": ("vinl.cli.eval_loco", "the locomotor alone in MuJoCo, under random commands"),
+    "eval-nav": ("vinl.cli.eval_nav", "the navigator alone, in homes that it has never seen"),
     "train-loco": ("vinl.cli.train_loco", "train a locomotor (needs the train extra)"),
     "train-nav": ("vinl.cli.train_nav", "train a navigator (needs the train extra)"),
     "plans": ("vinl.cli.plans", "list the shipped floor plans, draw a floor plan"),

@@ -1,0 +1,118 @@
+"""The navigator alone: the same episodes for every policy, honest ends, figures and a page; bad options in one line."""
+
+import json
+
+import numpy as np
+import pytest
+
+from vinl.cli.app import main
+from vinl.config.errors import InputError
+from vinl.config.loader import build_config
+from vinl.evaluation.nav_report import aggregate_by_distance, choose_drawn
+from vinl.nav.config import NavConfig
+from vinl.nav.evaluation import (
+    END_REASONS,
+    NavEvaluation,
+    NavRecord,
+    build_homes,
+    describe_episodes,
+    evaluate_kind,
+    expand_plans,
+    load_navigator,
+    name_kind,
+)
+from vinl.nav.training import build_actor, make_card
+from vinl.policies.io import save_policy
+
+TINY = {"camera": {"width": 32, "height": 24, "mount_height": 0.3}, "network": {"vision": "cnn", "hidden": 8}}
+
+
+@pytest.fixture
+def untrained(tmp_path):
+    config = build_config(NavConfig, TINY)
+    save_policy(tmp_path / "tiny", build_actor(config), make_card("tiny", config, 7, "abc"))
+    return str(tmp_path / "tiny")
+
+
+def results(tmp_path, *more: str) -> dict:
+    out = tmp_path / "out"
+    assert main(["eval-nav", "--floorplans", "harbour_flat", "--episodes", "6", "--out", str(out), *more]) == 0
+    assert (out / "report.html").read_text().count("<svg") >= 7
+    return json.loads((out / "results.json").read_text())
+
+
+def test_the_oracle_arrives_and_an_untrained_policy_does_not(tmp_path, untrained):
+    oracle = results(tmp_path, "--policy", "oracle")
+    poor = results(tmp_path, "--policy", untrained, "--steps", "12")
+    assert oracle["aggregate"]["success"]["mean"] > 0.8 and oracle["aggregate"]["spl"]["mean"] > 0.7
+    assert poor["aggregate"]["success"]["mean"] == 0.0 and poor["aggregate"]["end_reasons"]["success"] == 0
+    same = ("start", "goal", "yaw", "geodesic_m", "plan", "episode")
+    for a, b in zip(oracle["episodes"], poor["episodes"], strict=True):
+        assert all(a[key] == b[key] for key in same)
+        assert a["geodesic_m"] >= 5.0 and a["geodesic_m"] >= a["straight_m"] - 0.15
+    assert sum(poor["aggregate"]["end_reasons"].values()) == poor["aggregate"]["episodes"] == 6
+    assert poor["policies"]["navigation"]["trained_in"]["seed"] == 1
+    assert list(oracle["kinds"]) == ["shipped"] and oracle["kinds"]["shipped"]["distances"]
+
+
+def test_paths_end_where_the_record_says(untrained):
+    rules = NavEvaluation(episodes=8, steps=120)
+    config = describe_episodes(None, rules)
+    (store,) = build_homes(config, 0, 5, ["harbour_flat"], "cpu").values()
+    kind = evaluate_kind(None, "shipped", store, config)
+    assert len(kind.records) == len(kind.traces) == 8
+    for record, trace in zip(kind.records, kind.traces, strict=True):
+        length = np.linalg.norm(np.diff(trace.path, axis=0), axis=1).sum()
+        assert length == pytest.approx(record.distance_m, abs=0.1 + 0.02 * record.distance_m)
+        assert record.success == (record.end_reason == "success")
+        assert len(trace.path) == round(record.time_s / 0.5) + 1
+        left = np.linalg.norm(trace.path[-1] - record.goal)
+        assert not record.success or left < 0.33
+
+
+def test_the_camera_is_the_policys_and_its_motion_the_rules(untrained):
+    policy = load_navigator(untrained, "cpu")
+    config = describe_episodes(policy.card, NavEvaluation(motion="paper"))
+    assert (config.camera.width, config.camera.height, config.camera.mount_height) == (32, 24, 0.3)
+    assert config.motion.uniform > 0.5 and config.episodes.steps == 250 and config.episodes.distance == (5.0, 30.0)
+    assert describe_episodes(None, NavEvaluation()).camera is None
+
+
+def record(success: bool, spl: float, geodesic: float = 6.0) -> NavRecord:
+    end = "success" if success else "stuck"
+    return NavRecord("g", "p", 0, 0, (0, 0), (1, 1), 0, 5, geodesic, success, end, 9.0, 7.0, spl, spl, 2, 1.0)
+
+
+def test_classes_of_distance_and_what_is_drawn():
+    records = [record(True, 0.9), record(False, 0.0, 12.0), *(record(True, 0.5 + k / 100) for k in range(20))]
+    classes = aggregate_by_distance(records, END_REASONS)
+    assert [(c["from_m"], c["to_m"], c["episodes"]) for c in classes] == [(5.0, 7.5, 21), (10.0, 15.0, 1)]
+    worst, middle = choose_drawn(records)
+    assert worst[0] == 1 and len(worst) == 6 and len(middle) == 3 and not set(worst) & set(middle)
+
+
+def test_slices_and_kinds_of_floor_plans():
+    assert expand_plans(["a.jsonl.gz:1:6:2", "b.yaml"]) == ["a.jsonl.gz:1", "a.jsonl.gz:3", "a.jsonl.gz:5", "b.yaml"]
+    with pytest.raises(InputError, match="names no plan"):
+        expand_plans(["a.jsonl:5:5"])
+    kinds = [name_kind(p) for p in ("harbour_flat", "x/houses.jsonl.gz:3", "m/lab.yaml", "p.png")]
+    assert kinds == ["shipped", "houses", "ros_map", "picture"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--policy", "rough"], "navigator"),
+        (["--policy", "nothing"], "nothing"),
+        (["--policy", "oracle", "--motion", "wild"], "--motion"),
+        (["--policy", "oracle", "--episodes", "0"], "--episodes"),
+        (["--policy", "oracle", "--min-distance", "50"], "--min-distance"),
+        (["--policy", "oracle", "--homes", "0"], "--homes"),
+        (["--policy", "oracle", "--floorplans", "nowhere.json"], "nowhere.json"),
+    ],
+)
+def test_bad_options_are_one_line(arguments, message, capsys, tmp_path):
+    assert main(["eval-nav", "--out", str(tmp_path / "out"), *arguments]) == 2
+    error = capsys.readouterr().err
+    assert message in error and len(error.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,135 @@
+"""``vinl eval-nav``: a navigator alone, in homes that it has never seen."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass
+
+from vinl.cli.options import parse_options
+from vinl.config.errors import InputError
+
+
+@dataclass(frozen=True)
+class Options:
+    """Drive a navigator to goals in the kinematic environment and measure success, SPL and collisions: results.json
+    and report.html."""
+
+    policy: str
+    """A shipped navigator's name, the folder of a policy or run, or oracle: a follower of short ways."""
+    out: str
+    """Folder for results.json and report.html."""
+    floorplans: tuple[str, ...] = ()
+    """Floor plans beside the generated homes; FILE:FIRST:END:STEP is every STEP-th plan of a JSON lines file."""
+    homes: int | None = None
+    """Generated homes; 200 by default, none where --floorplans is given."""
+    homes_seed: int = 1_000_000_000
+    """Seed of the first home. Training takes seeds from its config's homes.seed on, 1 unless changed."""
+    episodes: int = 1000
+    """Episodes in each kind of homes."""
+    seed: int = 0
+    """Of starts, goals, headings and the camera's motion."""
+    motion: str = "walking"
+    """How camera and robot move: walking (as measured on the walking robot), or paper (roll and pitch redrawn within
+    30 deg at each step, perfect execution)."""
+    min_distance: float = 5.0
+    """Least geodesic distance from start to goal [m]."""
+    max_distance: float = 30.0
+    """Largest geodesic distance [m]."""
+    steps: int = 250
+    """Decisions of 0.5 s until an episode is out of time."""
+    device: str = "cpu"
+    """cpu or cuda. Only cpu repeats bit for bit."""
+
+
+def main(argv: list[str]) -> int:
+    """Run the evaluation and print its figures."""
+    options = parse_options(Options, argv, "eval-nav")
+    from rich.console import Console
+
+    from vinl.evaluation.nav_report import (
+        aggregate_by_distance,
+        aggregate_navigation,
+        print_navigation_summary,
+        render_navigation_report,
+    )
+    from vinl.evaluation.results_file import (
+        SCHEMA,
+        check_out,
+        describe_environment,
+        strip_command,
+        write_json,
+        write_text,
+    )
+    from vinl.nav.evaluation import (
+        END_REASONS,
+        NavEvaluation,
+        build_homes,
+        describe_episodes,
+        describe_policy,
+        evaluate_kind,
+        load_navigator,
+    )
+    from vinl.nav.measures import STUCK
+
+    out = check_out(options.out)
+    homes = (0 if options.floorplans else 200) if options.homes is None else options.homes
+    if homes < 0:
+        raise InputError(f"--homes must not be negative, got {homes}")
+    if not 0.5 <= options.min_distance <= options.max_distance:
+        raise InputError("--min-distance must lie between 0.5 m and --max-distance")
+    distance = (options.min_distance, options.max_distance)
+    rules = NavEvaluation(options.episodes, options.seed, options.motion, distance, options.steps)
+    policy = load_navigator(options.policy, options.device)
+    config = describe_episodes(None if policy is None else policy.card, rules)
+    console, begun = Console(), time.monotonic()
+    results = []
+    with Console(stderr=True).status("building homes") as status:
+        stores = build_homes(
+            config,
+            homes,
+            options.homes_seed,
+            options.floorplans,
+            options.device,
+            lambda done, total: status.update(f"building homes: {done} of {total}"),
+        )
+        for kind, store in stores.items():
+
+            def show(done: int, total: int, kind: str = kind) -> None:
+                status.update(f"{kind}: step {done} of at most {total}")
+
+            results.append(evaluate_kind(policy, kind, store, config, show))
+    records = [record for kind in results for record in kind.records]
+    if not records:
+        raise InputError("no home has a start and a goal as far apart as asked for; lower --min-distance")
+    data = {
+        "schema": SCHEMA,
+        "command": ["vinl", "eval-nav", *strip_command(argv)],
+        "config": {**asdict(rules), "homes": homes, "homes_seed": options.homes_seed, "stuck_steps": STUCK},
+        "policies": {"navigation": describe_policy(policy)},
+        "environment": describe_environment(),
+        "aggregate": aggregate_navigation(records, END_REASONS),
+        "kinds": {
+            kind.kind: {
+                "aggregate": aggregate_navigation(kind.records, END_REASONS),
+                "distances": aggregate_by_distance(kind.records, END_REASONS),
+                "homes": len(kind.homes),
+                "dropped": kind.dropped,
+                "left_out": kind.left_out,
+            }
+            for kind in results
+        },
+        "distances": aggregate_by_distance(records, END_REASONS),
+        "episodes": [asdict(record) for record in records],
+        "timing": {"wall_seconds": round(time.monotonic() - begun, 2)},
+    }
+    write_json(out / "results.json", data)
+    page = render_navigation_report(data, [(kind.records, kind.traces) for kind in results])
+    write_text(out / "report.html", page)
+    print_navigation_summary(console, data)
+    for kind in results:
+        if kind.dropped or kind.left_out:
+            console.print(
+                f"{kind.kind}: {kind.dropped} homes without a way, {kind.left_out} robots without a start were left out"
+            )
+    console.print(f"report {out / 'report.html'}; figures {out / 'results.json'}", soft_wrap=True)
+    return 0
