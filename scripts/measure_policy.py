@@ -2,7 +2,7 @@
 
     python scripts/measure_policy.py assets/policies/rough [--commit HASH]
 
-Takes about three minutes on two cores.
+Takes about four minutes on two cores.
 """
 
 from __future__ import annotations
@@ -18,18 +18,31 @@ from pathlib import Path
 from vinl.cli.app import main as vinl
 from vinl.policies.card import read_card, write_card
 
+BLOCKS = "eval-loco --terrain blocks --robots 64 --seconds 20 --seed 0"
 LOCO = {
     "flat": "eval-loco --terrain flat --robots 64 --seconds 20 --seed 0",
     "flat_forward_only": "eval-loco --terrain flat --robots 64 --seconds 20 --seed 0 --commands forward",
     "rough": "eval-loco --terrain rough --robots 192 --seconds 20 --seed 0",
     "rough_forward_only": "eval-loco --terrain rough --robots 192 --seconds 20 --seed 0 --commands forward",
-    "blocks": "eval-loco --terrain blocks --density 1.0 --robots 64 --seconds 20 --seed 0",
+    "blocks": f"{BLOCKS} --density 1.0",
+    "blocks_straight": f"{BLOCKS} --density 1.0 --commands straight",
+    "blocks_navigator": f"{BLOCKS} --density 1.0 --commands navigator",
+    "no_blocks": f"{BLOCKS} --density 0",
 }
 CHAIN = {
     "homes": "eval --nav oracle --episodes 10 --seeds 5 --obstacles none",
     "homes_paper_clutter": "eval --nav oracle --episodes 10 --seeds 5 --obstacles paper",
 }
-LOCO_FIGURES = ("falls", "linear_velocity_rmse", "yaw_rate_rmse", "foot_block_per_m", "leg_block_per_m", "mean_level")
+LOCO_FIGURES = (
+    "falls",
+    "linear_velocity_rmse",
+    "yaw_rate_rmse",
+    "foot_block_per_m",
+    "foot_front_block_per_m",
+    "foot_rear_block_per_m",
+    "leg_block_per_m",
+    "mean_level",
+)
 CHAIN_FIGURES = ("success", "spl", "foot_collisions_per_m", "leg_contacts_per_m")
 
 
