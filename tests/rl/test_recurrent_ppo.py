@@ -178,7 +178,7 @@ def test_the_rate_follows_the_divergence_within_its_limits():
 
 
 def test_robots_that_do_not_divide_are_refused():
-    with pytest.raises(InputError, match="multiple of ppo.minibatches"):
+    with pytest.raises(InputError, match=r"multiple of ppo\.minibatches"):
         build(n=6, minibatches=4)
 
 

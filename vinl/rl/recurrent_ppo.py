@@ -21,6 +21,7 @@ from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers
 from vinl.rl.recurrent_model import RecurrentActorCritic
 from vinl.rl.recurrent_storage import RecurrentStorage
+from vinl.rl.step_graph import StepGraph
 
 _LOG_2PI = math.log(2.0 * math.pi)
 _SUMS = ("surrogate", "value", "entropy", "kl", "clipped", "gradient_norm")
@@ -101,11 +102,13 @@ class RecurrentPPO:
         rate.bind(self.optimizer)
         if settings.compiled and on_gpu:
             _compile_vision(model)
-        self._graph = _MinibatchGraph(self._learn) if settings.graphs and on_gpu and self.peers.count == 1 else None
+        self._graph = StepGraph(self._learn) if settings.graphs and on_gpu and self.peers.count == 1 else None
         self._state = tuple(part.clone() for part in storage.state)
         self._fresh = torch.ones(storage.robots, dtype=torch.bool, device=self.device)
         self._sums = torch.zeros(len(_SUMS), device=self.device)
         self._kl = torch.zeros((), device=self.device)
+        # on the device, so that a recorded graph sees it move
+        self._entropy = torch.zeros((), device=self.device)
         self._step = 0
 
     @property
@@ -168,6 +171,7 @@ class RecurrentPPO:
         """
         s, n = self.settings, self.storage.robots
         self._sums.zero_()
+        self._entropy.fill_(s.entropy)
         for _ in range(s.epochs):
             self._kl.zero_()
             for robots in torch.randperm(n, device=self.device).chunk(s.minibatches):
@@ -254,7 +258,7 @@ class RecurrentPPO:
         near = batch.values + (value - batch.values).clamp(-s.clip, s.clip)
         value_loss = torch.max((value - batch.returns).square(), (near - batch.returns).square()).mean()
         entropy = (log_std + 0.5 * (1.0 + _LOG_2PI)).sum()
-        loss = surrogate + s.value * value_loss - s.entropy * entropy
+        loss = surrogate + s.value * value_loss - self._entropy * entropy
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         self.peers.average_gradients(model.parameters())
@@ -269,39 +273,6 @@ class RecurrentPPO:
             if s.adapt_each:
                 self.peers.average(kl)
                 self.rate.steer(kl)
-
-
-class _MinibatchGraph:
-    """Minibatch steps recorded once as a CUDA graph and replayed: no launch of single kernels.
-
-    The first steps run as they are, on a stream of their own, so that libraries set up what they need.
-    """
-
-    _WARM_UP = 3
-
-    def __init__(self, learn: Any) -> None:
-        self._learn, self._count = learn, 0
-        self._graph: torch.cuda.CUDAGraph | None = None
-        self._robots: Tensor | None = None
-
-    def run(self, robots: Tensor) -> None:
-        """One step on these robots; their number stays the same from call to call."""
-        self._count += 1
-        if self._robots is None:
-            self._robots = robots.clone()
-        self._robots.copy_(robots)
-        if self._graph is None and self._count <= self._WARM_UP:
-            side = torch.cuda.Stream()
-            side.wait_stream(torch.cuda.current_stream())
-            with torch.cuda.stream(side):
-                self._learn(self._robots)
-            torch.cuda.current_stream().wait_stream(side)
-            return
-        if self._graph is None:
-            self._graph = torch.cuda.CUDAGraph()
-            with torch.cuda.graph(self._graph):
-                self._learn(self._robots)
-        self._graph.replay()
 
 
 def _compile_vision(model: RecurrentActorCritic) -> None:
