@@ -136,6 +136,14 @@ def test_bad_options_are_one_line(arguments, message, capsys, tmp_path):
     assert not any(tmp_path.iterdir())
 
 
+def test_policies_are_kept_aside_and_a_profile_is_written(tmp_path, small):
+    run = tmp_path / "run"
+    assert train(small, run, "--iterations", "7", "--profile", "ppo.keep_at=[32, 100, 1000]") == 0
+    assert sorted(p.name for p in (run / "kept").iterdir()) == ["0.0001M", "3.2e-05M"]
+    assert load_policy(run / "kept" / "0.0001M").card.samples == 128
+    assert "aten::" in (run / "profile.txt").read_text()
+
+
 def test_another_network_than_the_policys_is_refused(tmp_path):
     config = build_config(NavConfig, {"camera": {"width": 32, "height": 24}, "network": {"vision": "cnn"}})
     save_policy(tmp_path / "p", build_actor(config), make_card("p", config, 5, "abc"))

@@ -99,7 +99,7 @@ def learn(algorithm, task, updates):
 def test_it_learns_what_only_memory_solves(image, image_type):
     torch.manual_seed(1)
     algorithm = build(image=image, image_type=image_type, entropy=0.0, gamma=0.5)
-    reward, losses = learn(algorithm, CueTask(64, image), 60)
+    reward, losses = learn(algorithm, CueTask(64, image), 40 if image else 60)
     # without memory the best that three of four steps can have is 0.75, less the spread of the actions
     assert reward > 0.9
     assert losses["kl"] >= 0.0 and losses["gradient_norm"] > 0.0

@@ -50,6 +50,8 @@ class Options:
     """Of everything random but the homes (default: the config's)."""
     save_every: float = 60.0
     """Seconds between checkpoints."""
+    profile: bool = False
+    """Write where the time of the sixth iteration goes to profile.txt in the run's folder."""
 
 
 def main(argv: list[str]) -> int:
@@ -89,6 +91,7 @@ def main(argv: list[str]) -> int:
         save_every=options.save_every,
         iterations=options.iterations,
         from_policy=options.from_policy,
+        profile=options.profile,
     )
     if int(os.environ.get("RANK", "0")) == 0:
         print(

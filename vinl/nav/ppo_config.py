@@ -78,6 +78,7 @@ class PpoConfig:
         bf16: images in bfloat16 (GPU only).
         compiled: image network through ``torch.compile`` (GPU only): a minute at the start, then faster.
         graphs: minibatches as a CUDA graph (one GPU only).
+        keep_at: the policy is also kept aside once after so many samples.
     """
 
     steps: int = 24
@@ -104,6 +105,7 @@ class PpoConfig:
     bf16: bool = True
     compiled: bool = True
     graphs: bool = False
+    keep_at: tuple[float, ...] = (2.5e6, 1e7, 2e7, 5e7, 1e8, 2e8, 5e8)
 
     def __post_init__(self) -> None:
         if min(self.steps, self.epochs, self.minibatches) < 1:

@@ -88,6 +88,7 @@ def train_navigator(
     save_every: float = 60.0,
     iterations: int | None = None,
     from_policy: str | None = None,
+    profile: bool = False,
 ) -> bool:
     """Train a navigator, or go on with a run. Under torchrun, this is one of the processes.
 
@@ -99,6 +100,7 @@ def train_navigator(
         save_every: seconds between checkpoints.
         iterations: updates in all; defaults to the configuration's.
         from_policy: start from the weights of this policy or run; default: fresh ones.
+        profile: write where the time of one iteration goes to ``profile.txt`` in the folder.
 
     Returns:
         Whether the run is complete (an interrupt stops it earlier; both leave a checkpoint and a policy).
@@ -128,14 +130,21 @@ def train_navigator(
     algorithm = build_algorithm(config, device, peers, None if start is None else start[0])
     commit = find_commit()
 
+    def write(model: RecurrentActorCritic, samples: int, folder: Path) -> None:
+        assert isinstance(model.actor, NavActor)
+        save_policy(folder, model.actor, make_card(name or run.path.name, config, samples, commit, origin))
+
     def export(model: RecurrentActorCritic, samples: int) -> None:
         if peers.leads:
-            assert isinstance(model.actor, NavActor)
-            save_policy(run.policy, model.actor, make_card(name or run.path.name, config, samples, commit, origin))
+            write(model, samples, run.policy)
 
     def schedule(learner: RecurrentPPO, share: float) -> None:
         learner.rate.limit(*config.ppo.rate_limits(share))
         learner.settings.entropy = config.ppo.entropy_at(share)
+        for mark in config.ppo.keep_at:
+            kept = run.path / "kept" / name_samples(mark)
+            if peers.leads and loop.samples >= mark and not kept.exists():
+                write(learner.model, loop.samples, kept)
 
     loop = PeerLoop(
         peers,
@@ -148,6 +157,7 @@ def train_navigator(
         describe_figures,
         schedule,
         save_every,
+        profile=profile,
     )
     if resume:
         loop.resume()
@@ -164,6 +174,11 @@ def describe_figures(row: dict[str, float]) -> dict[str, str]:
         if key in row:
             shown[key] = f"{row[key]:.{digits}f}"
     return {**shown, "rate": f"{row['learning_rate']:.1e}"}
+
+
+def name_samples(count: float) -> str:
+    """``2.5M`` for 2,500,000."""
+    return f"{count / 1e6:g}M"
 
 
 def check_minibatches(config: NavConfig) -> None:

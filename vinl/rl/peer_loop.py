@@ -11,7 +11,9 @@ import torch
 
 from vinl.rl.loop import TrainingLoop
 from vinl.rl.parallel import Peers
-from vinl.rl.run_folder import RunFolder
+from vinl.rl.run_folder import RunFolder, write_text
+
+_PROFILED = 6
 
 
 class PeerLoop(TrainingLoop):
@@ -20,10 +22,12 @@ class PeerLoop(TrainingLoop):
     Args:
         peers: of this training.
         arguments: as for ``TrainingLoop``; ``folder`` is what ``peer_folder`` returns.
+        profile: write where the time of one iteration goes to ``profile.txt`` in the folder.
     """
 
-    def __init__(self, peers: Peers, *arguments: Any, **rest: Any) -> None:
+    def __init__(self, peers: Peers, *arguments: Any, profile: bool = False, **rest: Any) -> None:
         self.peers, self._asked, self._agreed = peers, False, False
+        self._profile, self._profiler, self._rounds = profile and peers.leads, None, 0
         super().__init__(*arguments, **rest)
 
     @property
@@ -53,11 +57,26 @@ class PeerLoop(TrainingLoop):
         return {"action_std": float(self.alg.get_policy().output_std.detach().mean())}
 
     def _roll_out(self, observation: Any) -> Any:
+        self._take_profile()
         observation = super()._roll_out(observation)
         self._agreed = self.peers.any(self._asked, self.device)
         if str(self.device).startswith("cuda"):  # one wait an iteration: the curves tell roll-out from update
             torch.cuda.synchronize()
         return observation
+
+    def _take_profile(self) -> None:
+        """Profile the round ``_PROFILED``, roll-out and update; compiling and setting up are over by then."""
+        if self._profiler is not None:
+            self._profiler.stop()
+            on_gpu = str(self.device).startswith("cuda")
+            key = "self_device_time_total" if on_gpu else "self_cpu_time_total"
+            table = self._profiler.key_averages().table(sort_by=key, row_limit=40, max_name_column_width=70)
+            write_text(self.folder.path / "profile.txt", table)
+            self._profiler, self._profile = None, False
+        self._rounds += 1
+        if self._profile and self._rounds == _PROFILED:
+            self._profiler = torch.profiler.profile()
+            self._profiler.start()
 
 
 class FollowerFolder(RunFolder):
