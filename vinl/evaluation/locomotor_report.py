@@ -77,13 +77,15 @@ def _print_heights(console: Console, compared: Mapping[str, LocomotorResults]) -
     key = "foot_block_per_m_by_height"
     if not any(key in results.aggregate for results in compared.values()):
         return
-    table = Table(title="feet/m, legs/m on blocks, were all blocks so high [m]", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(title="steps on blocks per metre, were all blocks so high [m]", box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("policy", overflow="fold", min_width=9)
+    table.add_column("", no_wrap=True)
     for name in HEIGHT_NAMES:
         table.add_column(name, justify="right", no_wrap=True)
     for name, results in compared.items():
-        rows = [results.aggregate[f"{limb}_block_per_m_by_height"] for limb in ("foot", "leg")]
-        table.add_row(name, *[", ".join("-" if r[h] is None else f"{r[h]:.3g}" for r in rows) for h in HEIGHT_NAMES])
+        for limb, title in (("foot", "feet"), ("leg", "legs")):
+            row = results.aggregate[f"{limb}_block_per_m_by_height"]
+            table.add_row(name, title, *["-" if row[h] is None else f"{row[h]:.2f}" for h in HEIGHT_NAMES])
     console.print(table)
 
 
