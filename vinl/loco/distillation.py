@@ -143,6 +143,7 @@ class Distillation:
         state = tuple(torch.cat([start[:, robots] for start in part], 1) for part in zip(*self._starts, strict=True))
         with self._reduced():
             code, _ = self.student.encode(cut(self._depth), vectors, state, cut(self._fresh))
+        code = code.float()  # autocast leaves it in bfloat16 on a GPU, and the labels are not
         code_loss = functional.mse_loss(code, labels)
         # the same noisy proprioception on both sides: the actions differ by what the codes say
         with torch.no_grad():
