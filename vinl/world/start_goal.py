@@ -98,6 +98,23 @@ def sample_start_goals(
     return pairs
 
 
+def check_way(plan: FloorPlan) -> FloorPlan:
+    """The plan, if the robot has a way of ``LEAST_WAY`` to go in it.
+
+    Raises:
+        InputError: if its free floor is in pieces, none of which is that long.
+    """
+    space = FreeSpace(plan)
+    pieces = int(space.regions.max())
+    longest = _measure_extent(plan.frame.xy(np.argwhere(space.regions == space.largest)))
+    if longest < LEAST_WAY:
+        raise InputError(
+            f"{plan.source}: a home without a path: the free floor of {plan.area_m2:.1f} m2 is in {pieces} pieces for "
+            f"the robot, the largest {longest:.1f} m long; are doors missing, or is the scale wrong?"
+        )
+    return plan
+
+
 def _find_spots(plan: FloorPlan, space: FreeSpace, clearance: float) -> tuple[Float[np.ndarray, "m 2"], list[str]]:
     """Where starts and goals may lie in the largest region [m], and what is to be said about it."""
     notes = []

@@ -1,4 +1,4 @@
-"""Floor plans from files: pictures, ROS maps, ProcTHOR houses and the plans that travel with the package."""
+"""Floor plans from files: pictures, ROS maps, houses as JSON, meshes and the plans that travel with the package."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from vinl.world.readers.ros_map import read_ros_map
 IMAGES = (".png", ".pgm")
 ROS_MAPS = (".yaml", ".yml")
 JSONS = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
+MESHES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 
 __all__ = ["load_floorplan", "load_floorplans", "shipped_floorplans"]
 
@@ -25,17 +26,24 @@ def shipped_floorplans() -> list[str]:
 
 
 def load_floorplan(
-    path: str | Path, resolution: float | None = None, min_speck: int = 0, wall_height: float = 2.5
+    path: str | Path,
+    resolution: float | None = None,
+    min_speck: int = 0,
+    wall_height: float = 2.5,
+    up: str | None = None,
 ) -> FloorPlan:
     """Read a floor plan; the file's ending says how.
 
     Args:
-        path: ``.png`` or ``.pgm`` picture; ``.yaml`` of a ROS map; ``.json``, ``.jsonl``, ``.jsonl.gz`` in ProcTHOR's
-            format or this package's own, ``:index`` behind it choosing one of several; or the bare name of a shipped
-            plan.
-        resolution: metres per pixel of a bare picture (0.05 if not given); the other kinds carry their own scale.
+        path: ``.png`` or ``.pgm`` picture; ``.yaml`` of a ROS map; ``.json``, ``.jsonl``, ``.jsonl.gz`` in the format
+            of ProcTHOR, HouseExpo, Raster2Vec or this package, ``:index`` behind it choosing one of several; a
+            triangle mesh ``.glb``, ``.obj``, ``.ply``, ``.stl``; or the bare name of a shipped plan.
+        resolution: metres per pixel of a bare picture (0.05 if not given) or of Raster2Vec's vectors (their own if
+            not given), metres per unit of a mesh or of HouseExpo (1 if not given); other kinds carry their own scale.
         min_speck: pieces of wall of fewer pixels than this are dropped from pictures and ROS maps; 0 keeps all.
-        wall_height: height of walls in pictures and ROS maps [m].
+        wall_height: height of walls in pictures, ROS maps, HouseExpo and vectors; what is higher in a mesh is left
+            out [m].
+        up: which way is up in a mesh: x, y, z, -x, -y or -z; if not given, y for ``.glb`` and ``.gltf``, else z.
 
     Raises:
         InputError: if the file is missing, broken, or holds no floor that the robot can stand on.
@@ -43,8 +51,9 @@ def load_floorplan(
     text = str(path)
     if text in shipped_floorplans():
         text = str(assets_dir() / "floorplans" / f"{text}.json")
-    if resolution is not None and not 0.002 <= resolution <= 2.0:
-        raise InputError(f"--resolution {resolution:g}: give metres per pixel between 0.002 and 2")
+    finest = 0.002 if text.lower().endswith(IMAGES + ROS_MAPS) else 1e-4
+    if resolution is not None and not finest <= resolution <= 2.0:
+        raise InputError(f"--resolution {resolution:g}: give metres per pixel between {finest:g} and 2")
     if min_speck < 0:
         raise InputError(f"--min-speck {min_speck}: give a number of pixels, 0 or more")
     if not 0.3 <= wall_height <= 20.0:
@@ -57,21 +66,29 @@ def load_floorplan(
     if file.is_dir():
         raise InputError(f"{text}: is a folder; give the files in it, for example {text}/map.yaml")
     if ending.endswith(JSONS):
-        return read_json_plan(file, index)
+        return read_json_plan(file, index, resolution, wall_height)
     if index is not None:
         raise InputError(f"{text}: only JSON files hold several plans; leave :{index} away")
     if ending.endswith(ROS_MAPS):
         return read_ros_map(file, min_speck, wall_height)
     if ending.endswith(IMAGES):
         return read_image_plan(file, resolution, min_speck, wall_height)
-    raise InputError(f"{text}: unknown kind of floor plan; known are {', '.join(IMAGES + ROS_MAPS + JSONS)}")
+    if ending.endswith(MESHES):
+        from vinl.world.readers.mesh_plan import read_mesh_plan
+
+        return read_mesh_plan(file, up, resolution, wall_height)
+    raise InputError(f"{text}: unknown kind of floor plan; known are {', '.join(IMAGES + ROS_MAPS + JSONS + MESHES)}")
 
 
 def load_floorplans(
-    paths: Sequence[str | Path], resolution: float | None = None, min_speck: int = 0, wall_height: float = 2.5
+    paths: Sequence[str | Path],
+    resolution: float | None = None,
+    min_speck: int = 0,
+    wall_height: float = 2.5,
+    up: str | None = None,
 ) -> list[FloorPlan]:
     """Read several floor plans, the shipped ones if none are named; see ``load_floorplan``."""
-    return [load_floorplan(path, resolution, min_speck, wall_height) for path in paths or shipped_floorplans()]
+    return [load_floorplan(path, resolution, min_speck, wall_height, up) for path in paths or shipped_floorplans()]
 
 
 def _split_index(text: str) -> tuple[Path, int | None]:

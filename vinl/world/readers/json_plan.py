@@ -12,12 +12,26 @@ from vinl.config.errors import InputError
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers.boxes_plan import SCHEMA as BOXES_SCHEMA
 from vinl.world.readers.boxes_plan import build_boxes_plan
+from vinl.world.readers.houseexpo import build_houseexpo_plan, is_houseexpo
 from vinl.world.readers.own import SCHEMA, build_own_plan
 from vinl.world.readers.procthor import build_procthor_plan
+from vinl.world.readers.vectors import build_vector_plan, is_vector_plan
+from vinl.world.start_goal import check_way
 
 
-def read_json_plan(file: Path, index: int | None) -> FloorPlan:
-    """Read plan number ``index`` (from 0 on; the first if ``None``) of a file in ProcTHOR's format or our own.
+def read_json_plan(
+    file: Path, index: int | None, resolution: float | None = None, wall_height: float = 2.5
+) -> FloorPlan:
+    """Read plan number ``index`` (from 0 on; the first if ``None``) of a file.
+
+    What is in it tells the format: our own two by their ``schema``, HouseExpo by ``verts``, vectors by walls of four
+    numbers, ProcTHOR otherwise.
+
+    Args:
+        file: what to read.
+        index: of the plan.
+        resolution: metres per pixel of vectors, metres per unit of HouseExpo; ``None`` takes what the format says.
+        wall_height: of vectors and HouseExpo [m].
 
     Raises:
         InputError: if the file is broken, holds no such plan, or the plan has no floor for the robot.
@@ -39,8 +53,14 @@ def read_json_plan(file: Path, index: int | None) -> FloorPlan:
                 known = f"'{SCHEMA}' and '{BOXES_SCHEMA}'"
                 raise InputError(f"{source}: unknown schema '{house['schema']}'; this version reads {known}")
             return build_own_plan(house, name, source)
+        if is_houseexpo(house):
+            return check_way(build_houseexpo_plan(house, name, source, resolution, wall_height))
+        if is_vector_plan(house):
+            return check_way(build_vector_plan(house, name, source, resolution, wall_height))
         if "rooms" not in house or "walls" not in house:
-            raise InputError(f"{source}: not a floor plan; a ProcTHOR house has 'rooms' and 'walls'")
+            raise InputError(
+                f"{source}: not a floor plan; a ProcTHOR house has 'rooms' and 'walls', a HouseExpo file has 'verts'"
+            )
         return build_procthor_plan(house, name, source, file.parent / "asset_bbox.json")
     except (KeyError, TypeError, IndexError, AttributeError) as error:
         raise InputError(f"{source}: the plan lacks an entry or has one of the wrong kind ({error!r})") from None

@@ -1,0 +1,118 @@
+"""Floor plans of HouseExpo: one closed outline in metres."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from vinl.config.errors import InputError
+from vinl.world.boxes import Boxes
+from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan, frame_around
+from vinl.world.readers.polygons import paint_polygon
+
+WALL_THICKNESS = 0.08
+"""Walls stand on the outline, this thick [m]. Between rooms the outline runs along both faces of the real wall."""
+
+LARGEST = 200.0
+"""A home wider than this is not in metres [m]."""
+
+
+def is_houseexpo(entries: dict[str, Any]) -> bool:
+    """Whether a JSON object is one of HouseExpo's."""
+    return "verts" in entries or ("room_category" in entries and "walls" not in entries)
+
+
+def build_houseexpo_plan(
+    entries: dict[str, Any], name: str, source: str, scale: float | None, wall_height: float
+) -> FloorPlan:
+    """Build a floor plan from ``verts``, with room names from ``room_category``.
+
+    Args:
+        entries: the plan.
+        name: of the plan, if it has no ``id``.
+        source: file and number, for errors.
+        scale: metres per unit; 1 if ``None``.
+        wall_height: [m].
+
+    Raises:
+        InputError: if the outline is missing, too short, crosses itself or is not in metres.
+    """
+    verts = entries.get("verts")
+    if not isinstance(verts, list) or len(verts) < 3:
+        found = "none" if not verts else f"{len(verts)} points" if isinstance(verts, list) else "something else"
+        raise InputError(f"{source}: a HouseExpo file needs an outline 'verts' of 3 points or more; found {found}")
+    points = np.array([[float(x), float(y)] for x, y in verts]) * (scale or 1.0)
+    if not np.isfinite(points).all():
+        raise InputError(f"{source}: the outline has a coordinate that is not a number")
+    points = points[np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > 1e-6]  # closed: first is last
+    if len(points) < 3:
+        raise InputError(f"{source}: the outline has fewer than 3 different points")
+    low, high = points.min(0), points.max(0)
+    if (high - low).max() > LARGEST:
+        raise InputError(
+            f"{source}: the outline is {high[0] - low[0]:.0f} x {high[1] - low[1]:.0f} m; HouseExpo is in metres; if "
+            "this is in millimetres, give --resolution 0.001"
+        )
+    _check_box(entries.get("bbox"), (high - low) / (scale or 1.0), source)
+    crossing = find_crossing(points)
+    if crossing is not None:
+        x, y = crossing
+        raise InputError(f"{source}: the outline crosses itself at ({x:.2f}, {y:.2f}); the order of 'verts' is wrong")
+    frame = frame_around(low, high, source)
+    inside = paint_polygon(points, frame)
+    walls = Boxes(np.array([_raise(a, b, wall_height) for a, b in zip(points, np.roll(points, -1, 0), strict=True)]))
+    return assemble_floorplan(
+        str(entries.get("id", name)), source, walls, Boxes.empty(), inside, frame, labels=_name(entries, scale or 1.0)
+    )
+
+
+def find_crossing(points: Float[np.ndarray, "k 2"]) -> tuple[float, float] | None:
+    """Where two edges of a closed outline cross, if any do. Edges that only touch are let be: walls without
+    thickness."""
+    a, b = points, np.roll(points, -1, axis=0)
+    edge = b - a
+
+    def side(p: np.ndarray) -> np.ndarray:  # of point j relative to edge i [m]
+        d = p[None] - a[:, None]
+        return (edge[:, None, 0] * d[..., 1] - edge[:, None, 1] * d[..., 0]) / np.linalg.norm(edge, axis=1)[:, None]
+
+    start, end = side(a), side(b)
+    apart = (np.minimum(start, end) < -1e-6) & (np.maximum(start, end) > 1e-6)
+    pairs = np.argwhere(np.triu(apart & apart.T))
+    if not len(pairs):
+        return None
+    i, j = pairs[0]
+    share = start[i, j] / (start[i, j] - end[i, j])
+    x, y = a[j] + share * edge[j]
+    return float(x), float(y)
+
+
+def _raise(a: np.ndarray, b: np.ndarray, height: float) -> list[float]:
+    middle, along = (a + b) / 2, b - a
+    # half a thickness beyond both ends fills the corners
+    length = float(np.linalg.norm(along)) + WALL_THICKNESS
+    yaw = float(np.arctan2(along[1], along[0]))
+    return [float(middle[0]), float(middle[1]), yaw, length, WALL_THICKNESS, 0.0, height]
+
+
+def _check_box(box: Any, size: np.ndarray, source: str) -> None:
+    """The file's own bounding box tells whether its outline is the whole one."""
+    if not isinstance(box, dict) or "min" not in box or "max" not in box:
+        return
+    told = np.array(box["max"], dtype=float)[:2] - np.array(box["min"], dtype=float)[:2]
+    if (np.abs(told - size) > 0.3 * np.maximum(told, size) + 1.0).any():
+        raise InputError(
+            f"{source}: 'verts' span {size[0]:.1f} x {size[1]:.1f}, but 'bbox' says {told[0]:.1f} x {told[1]:.1f}; "
+            "the outline is not the whole one, or in other units"
+        )
+
+
+def _name(entries: dict[str, Any], scale: float) -> tuple[RoomLabel, ...]:
+    labels = []
+    for kind, boxes in (entries.get("room_category") or {}).items():
+        for box in boxes:
+            x0, y0, x1, y1 = (float(v) * scale for v in box[:4])
+            labels.append(RoomLabel(str(kind), (x0 + x1) / 2, (y0 + y1) / 2))
+    return tuple(labels)
