@@ -138,9 +138,11 @@ def test_bad_options_are_one_line(arguments, message, capsys, tmp_path):
 
 def test_policies_are_kept_aside_and_a_profile_is_written(tmp_path, small):
     run = tmp_path / "run"
-    assert train(small, run, "--iterations", "7", "--profile", "ppo.keep_at=[32, 100, 1000]") == 0
+    more = ["ppo.keep_at=[32, 100, 1000]", "ppo.last_log_std=-1.5"]
+    assert train(small, run, "--iterations", "7", "--profile", *more) == 0
     assert sorted(p.name for p in (run / "kept").iterdir()) == ["0.0001M", "3.2e-05M"]
     assert load_policy(run / "kept" / "0.0001M").card.samples == 128
+    assert rows(run)[-1]["action_std"] < 0.55  # from 0.61
     assert "aten::" in (run / "profile.txt").read_text()
 
 
@@ -158,6 +160,8 @@ def test_the_learning_rate_and_the_entropy_cool_down():
     assert ppo.rate_limits(0.0) == ppo.rate_limits(0.5) == (2e-4, 1e-3)
     assert ppo.rate_limits(1.0) == pytest.approx((1e-5, 1e-5))
     assert ppo.rate_limits(0.75) == pytest.approx((1.05e-4, 5.05e-4))
+    assert PpoConfig(cool_from=0.5, last_log_std=-1.8).spread_at(0.75) == pytest.approx((-2.0, -0.8))
+    assert ppo.spread_at(1.0) == ppo.log_std_range
     assert ppo.entropy_at(0.5) == 0.003 and ppo.entropy_at(1.0) == 0.0
     linear = PpoConfig(schedule="linear", last_rate=1e-5)
     assert linear.rate_limits(0.5) == pytest.approx((2.55e-4, 2.55e-4))

@@ -74,6 +74,8 @@ class PpoConfig:
             null: it stays.
         max_grad_norm: gradients are clipped to this norm.
         log_std, log_std_range: logarithm of the actions' standard deviation at the start, and its limits.
+        last_log_std: from ``cool_from`` on the upper limit moves to this: what is shipped acts without chance, and
+            only training almost without chance shows it where it would get stuck; null: the limit stays.
         image_type: how the roll-out keeps images: ``float16``, or ``uint8`` in half the memory.
         bf16: images in bfloat16 (GPU only).
         compiled: image network through ``torch.compile`` (GPU only): a minute at the start, then faster.
@@ -101,6 +103,7 @@ class PpoConfig:
     max_grad_norm: float = 0.5
     log_std: float = -0.5
     log_std_range: tuple[float, float] = (-2.0, 0.2)
+    last_log_std: float | None = None
     image_type: str = "float16"
     bf16: bool = True
     compiled: bool = True
@@ -127,6 +130,8 @@ class PpoConfig:
         low, high = self.log_std_range
         if not low <= self.log_std <= high or not math.isfinite(low + high):
             raise InputError(f"ppo.log_std must lie within log_std_range {low:g} to {high:g}, got {self.log_std:g}")
+        if self.last_log_std is not None and not low <= self.last_log_std <= high:
+            raise InputError(f"ppo.last_log_std must lie within log_std_range, got {self.last_log_std:g}")
 
     def rate_limits(self, share: float) -> tuple[float, float]:
         """Lowest and highest learning rate after a share of the iterations."""
@@ -143,6 +148,12 @@ class PpoConfig:
         """Weight of the entropy bonus after a share of the iterations."""
         last = self.entropy if self.last_entropy is None else self.last_entropy
         return self.entropy + self._cooled(share) * (last - self.entropy)
+
+    def spread_at(self, share: float) -> tuple[float, float]:
+        """Limits of the logarithm of the actions' standard deviation after a share of the iterations."""
+        low, high = self.log_std_range
+        last = high if self.last_log_std is None else self.last_log_std
+        return low, high + self._cooled(share) * (last - high)
 
     def _cooled(self, share: float) -> float:
         return min(max((share - self.cool_from) / (1.0 - self.cool_from), 0.0), 1.0) if self.cool_from < 1 else 0.0

@@ -141,6 +141,8 @@ def train_navigator(
     def schedule(learner: RecurrentPPO, share: float) -> None:
         learner.rate.limit(*config.ppo.rate_limits(share))
         learner.settings.entropy = config.ppo.entropy_at(share)
+        if config.ppo.last_log_std is not None:
+            learner.model.limit_spread(config.ppo.spread_at(share))
         for mark in config.ppo.keep_at:
             kept = run.path / "kept" / name_samples(mark)
             if peers.leads and loop.samples >= mark and not kept.exists():

@@ -49,6 +49,8 @@ class RecurrentActorCritic(nn.Module):
         values: width of a layer between feature and value; 0: none.
     """
 
+    _log_std_range: Tensor
+
     def __init__(
         self,
         actor: PolicyNetwork,
@@ -61,7 +63,8 @@ class RecurrentActorCritic(nn.Module):
         self.actor = actor
         self.privileged = privileged
         self.log_std = nn.Parameter(torch.full((actor.action_size,), float(log_std)))
-        self._log_std_range = log_std_range
+        # on the device, so that a recorded graph sees it move
+        self.register_buffer("_log_std_range", torch.tensor(log_std_range, dtype=torch.float32), persistent=False)
         width = cast(MemoryActor, actor).feature_size + privileged
         self.value = nn.Sequential(*([nn.Linear(width, values), nn.ELU()] if values else []))
         self.value.append(nn.Linear(values or width, 1))
@@ -89,7 +92,11 @@ class RecurrentActorCritic(nn.Module):
     @torch.no_grad()
     def hold_spread(self) -> None:
         """Keep the actions' spread within its range. A clamp inside ``forward`` would stop its gradient for good."""
-        self.log_std.clamp_(*self._log_std_range)
+        self.log_std.copy_(self.log_std.clamp(self._log_std_range[0], self._log_std_range[1]))
+
+    def limit_spread(self, log_std_range: tuple[float, float]) -> None:
+        """Move the limits of the actions' spread; they hold from the next step of the optimiser on."""
+        self._log_std_range.copy_(torch.tensor(log_std_range, dtype=torch.float32))
 
     @property
     def output_std(self) -> Float[Tensor, " a"]:
