@@ -23,3 +23,35 @@ def test_show_draws_a_plan(tmp_path, capsys):
 def test_bad_options_are_explained(argv):
     with pytest.raises(InputError):
         main(argv)
+
+
+def test_generate_writes_homes_that_are_read_again(tmp_path, capsys):
+    out = tmp_path / "homes"
+    assert main(["generate", "--count", "3", "--seed", "7", "--out", str(out), "--set", "area=[45,70]"]) == 0
+    assert sorted(path.name for path in out.iterdir()) == ["contact.png", *(f"home-{k}.json" for k in (7, 8, 9))]
+    assert "3 homes" in capsys.readouterr().out
+    assert main(["show", str(out / "home-8.json")]) == 0
+    assert "home-8" in capsys.readouterr().out
+    (out / "c.yaml").write_text("furniture_density: [0.0, 0.0]\n")
+    argv = [
+        "generate",
+        "--count",
+        "1",
+        "--seed",
+        "7",
+        "--out",
+        str(out),
+        "--config",
+        str(out / "c.yaml"),
+        "--no-picture",
+    ]
+    assert main(argv) == 0
+    assert '"furniture": []' in (out / "home-7.json").read_text()
+
+
+@pytest.mark.parametrize(
+    "more", [["--count", "0"], ["--seed", "-1"], ["--set", "aera=[45,70]"], ["--set", "area=[5,6]"]]
+)
+def test_bad_options_of_generate_are_explained(tmp_path, more):
+    with pytest.raises(InputError):
+        main(["generate", "--out", str(tmp_path), *more])

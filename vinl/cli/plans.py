@@ -26,7 +26,9 @@ class ShowPlan:
     out: Path | None = None
     """PNG file for the picture; not drawn if left away."""
     resolution: float | None = None
-    """Metres per pixel of a bare picture; 0.05 if left away."""
+    """Metres per pixel of a bare picture (0.05 if left away), metres per unit of a mesh (1 if left away)."""
+    up: str | None = None
+    """Which way is up in a mesh: x, y, z, -x, -y or -z; found by the kind of file and its shape if left away."""
     min_speck: int = 0
     """Drop pieces of wall of fewer pixels than this."""
     obstacles: str = "none"
@@ -127,7 +129,7 @@ def _show_plan(options: ShowPlan) -> None:
         raise InputError(f"--obstacles {options.obstacles}: choose one of {', '.join(CLUTTER)}")
     if options.seed < 0:
         raise InputError(f"--seed {options.seed}: give a number, 0 or more")
-    plan = load_floorplan(options.path, options.resolution, options.min_speck)
+    plan = load_floorplan(options.path, options.resolution, options.min_speck, up=options.up)
     space = FreeSpace(plan)
     rng = np.random.default_rng(options.seed)
     pairs = sample_start_goals(plan, options.episodes, rng)

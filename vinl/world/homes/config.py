@@ -75,5 +75,5 @@ class HomeConfig:
             raise InputError(f"homes: area needs some room between least and most, got {self.area}")
         if self.door_height[1] > self.wall_height[0]:
             raise InputError("homes: the highest door must not be higher than the lowest wall")
-        if self.corridor_width[0] - max(self.inner_wall[1], self.outer_wall[1]) < self.door_width[0]:
-            raise InputError("homes: a corridor less its walls must be at least as wide as the narrowest door")
+        if self.corridor_width[0] - max(self.inner_wall[1], self.outer_wall[1]) < RANGES["door_width"][0]:
+            raise InputError(f"homes: a corridor less its walls must be {RANGES['door_width'][0]:g} m wide or more")

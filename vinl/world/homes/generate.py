@@ -12,11 +12,13 @@ from vinl.world.floorplan import RESOLUTION, FloorPlan, RoomLabel, assemble_floo
 from vinl.world.homes.config import HomeConfig
 from vinl.world.homes.furnish import furnish
 from vinl.world.homes.reach import CHECKED_AT, keep_connected, paint_rects
-from vinl.world.homes.rooms import draw_rooms, measure
-from vinl.world.homes.walls import raise_shell
+from vinl.world.homes.rooms import Room, draw_rooms, measure
+from vinl.world.homes.walls import Shell, raise_shell
 
 ATTEMPTS = 100
 """Layouts drawn for a home before the ranges are taken for impossible; one to three are the rule."""
+
+IMPOSSIBLE = "homes: no home fits the config; widen its ranges (area, corridor_width, door_width)"
 
 
 def generate_home(seed: int, config: HomeConfig | None = None, resolution: float = RESOLUTION) -> FloorPlan:
@@ -41,31 +43,48 @@ def generate_home(seed: int, config: HomeConfig | None = None, resolution: float
     rng = Random(seed)
     name = f"home-{seed}"
     for _ in range(ATTEMPTS):
-        rooms = draw_rooms(rng, config)
-        rects = [rect for room in rooms for rect in room.rects]
-        if not config.area[0] <= sum(map(measure, rects)) <= config.area[1]:
-            continue
-        shell = raise_shell(rng, rooms, config)
-        if shell is None:
-            continue
+        shell = _draw_shell(rng, config)
         walls = Boxes(np.array(shell.walls))
+        rects = [rect for room in shell.rooms for rect in room.rects]
         corners = np.array(rects)
         low, high = corners[:, :2].min(0), corners[:, 2:].max(0)
         frame = frame_around(low, high, name, CHECKED_AT)
         inside = paint_rects(rects, frame)
-        pieces = keep_connected(rooms, walls, furnish(rng, shell, config), inside, frame)
+        pieces = keep_connected(shell.rooms, walls, furnish(rng, shell, config), inside, frame)
         if pieces is None:
             continue
         if resolution != CHECKED_AT:
             frame = frame_around(low, high, name, resolution)
             inside = paint_rects(rects, frame)
         furniture = Boxes(np.array([row for piece in pieces for row in piece.rows]).reshape(-1, 7))
-        labels = []
-        for room in rooms:
-            x0, y0, x1, y1 = max(room.rects, key=measure)
-            labels.append(RoomLabel(room.kind, (x0 + x1) / 2, (y0 + y1) / 2))
         panes = Boxes(np.array(shell.panes).reshape(-1, 7))
-        return assemble_floorplan(
-            name, f"generated:{seed}", walls, furniture, inside, frame, panes, tuple(labels), roomy=True
-        )
-    raise InputError("homes: no home fits the config; widen its ranges (area, corridor_width, door_width)")
+        labels = tuple(_label(room) for room in shell.rooms)
+        return assemble_floorplan(name, f"generated:{seed}", walls, furniture, inside, frame, panes, labels, roomy=True)
+    raise InputError(IMPOSSIBLE)
+
+
+def draw_shell(seed: int, config: HomeConfig) -> tuple[Random, Shell]:
+    """The rooms, walls and doors that a seed is tried with first, and the chance to draw the furniture from.
+
+    Raises:
+        InputError: if no home fits the config.
+    """
+    rng = Random(seed)
+    shell = _draw_shell(rng, config)
+    return rng, shell
+
+
+def _draw_shell(rng: Random, config: HomeConfig) -> Shell:
+    for _ in range(ATTEMPTS):
+        rooms = draw_rooms(rng, config)
+        if not config.area[0] <= sum(room.area for room in rooms) <= config.area[1]:
+            continue
+        shell = raise_shell(rng, rooms, config)
+        if shell is not None:
+            return shell
+    raise InputError(IMPOSSIBLE)
+
+
+def _label(room: Room) -> RoomLabel:
+    x0, y0, x1, y1 = max(room.rects, key=measure)
+    return RoomLabel(room.kind, (x0 + x1) / 2, (y0 + y1) / 2)

@@ -43,7 +43,8 @@ def load_floorplan(
         min_speck: pieces of wall of fewer pixels than this are dropped from pictures and ROS maps; 0 keeps all.
         wall_height: height of walls in pictures, ROS maps, HouseExpo and vectors; what is higher in a mesh is left
             out [m].
-        up: which way is up in a mesh: x, y, z, -x, -y or -z; if not given, y for ``.glb`` and ``.gltf``, else z.
+        up: which way is up in a mesh: x, y, z, -x, -y or -z; if not given, y for ``.glb`` and ``.gltf``, else
+            y or z, whichever the mesh is shorter along.
 
     Raises:
         InputError: if the file is missing, broken, or holds no floor that the robot can stand on.

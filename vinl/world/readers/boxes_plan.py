@@ -43,4 +43,7 @@ def build_boxes_plan(entries: dict[str, Any], name: str, source: str) -> FloorPl
 
 
 def _read(rows: list[list[float]]) -> Boxes:
-    return Boxes(np.array(rows, dtype=float)) if rows else Boxes.empty()
+    table = np.array(rows, dtype=float)
+    if rows and (table.ndim != 2 or table.shape[1] != 7):
+        raise InputError("a box needs 7 numbers: x, y, yaw, length, width, bottom, top")
+    return Boxes(table) if rows else Boxes.empty()

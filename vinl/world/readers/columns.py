@@ -57,7 +57,7 @@ class Columns:
     @property
     def low(self) -> Bool[np.ndarray, "rows columns"]:
         """Cells with something in the robot's way."""
-        return self.layers[: _layer(BODY_HEIGHT)].any(0)
+        return np.logical_or.reduce(self.layers[: _layer(BODY_HEIGHT)])
 
     @property
     def tall(self) -> Bool[np.ndarray, "rows columns"]:

@@ -44,7 +44,8 @@ def read_mesh_plan(file: Path, up: str | None, scale: float | None, wall_height:
 
     Args:
         file: the mesh; all objects of a scene count.
-        up: x, y, z, -x, -y or -z; ``None`` takes y for glTF, as that format says, and z for the others.
+        up: x, y, z, -x, -y or -z; ``None`` takes y for glTF, as that format says, and for the others y or z,
+            whichever the mesh is shorter along: homes are wider than high.
         scale: metres per unit; ``None`` takes 1 and refuses what cannot be in metres.
         wall_height: what is higher above the floor is left out: ceilings, upper storeys [m].
 
@@ -53,7 +54,10 @@ def read_mesh_plan(file: Path, up: str | None, scale: float | None, wall_height:
             or no way for the robot.
     """
     vertices, faces = _load(file)
-    vertices = _turn_up(vertices, up or ("y" if file.suffix.lower() in (".glb", ".gltf") else "z")) * (scale or 1.0)
+    size = vertices.max(0) - vertices.min(0)
+    lies = file.suffix.lower() in (".glb", ".gltf") or size[1] < size[2]
+    up = up or ("y" if lies else "z")
+    vertices = _turn_up(vertices, up) * (scale or 1.0)
     if scale is None:
         _check_units(vertices, file)
     triangles = vertices[faces]
@@ -117,7 +121,7 @@ def _check_units(vertices: np.ndarray, file: Path) -> None:
         )
 
 
-def _find_floor(triangles: Float[np.ndarray, "f 3 3"], file: Path, up: str | None) -> float:
+def _find_floor(triangles: Float[np.ndarray, "f 3 3"], file: Path, up: str) -> float:
     """Height of the floor [m]: the lowest height with much level surface that faces up, or, where the mesh does not
     say which side is out, that faces up or down."""
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -139,7 +143,7 @@ def _find_floor(triangles: Float[np.ndarray, "f 3 3"], file: Path, up: str | Non
             return float(np.average(z[level][there], weights=area[level][there]))
     raise InputError(
         f"{file}: a mesh without a floor: at no height is there more than {best:.1f} m2 of level surface, "
-        f"{FLOOR_AREA:g} m2 are needed; does {'y or z' if up is None else up} really point up (--up)?"
+        f"{FLOOR_AREA:g} m2 are needed; does {up} really point up (--up)?"
     )
 
 
