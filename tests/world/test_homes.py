@@ -31,10 +31,10 @@ def draw(seed: int, config: HomeConfig | None = None) -> tuple[Random, Shell]:
 @given(SEEDS)
 def test_every_room_is_reached(seed):
     plan = generate_home(seed)
-    for radius, most in ((0.22, 0.97), (FIT_RADIUS, 0.95)):
+    for radius in (0.22, FIT_RADIUS):
         space = FreeSpace(plan, radius=radius)
         main = space.regions == space.largest
-        assert main.sum() >= most * space.traversable.sum()
+        assert main.sum() >= 0.85 * space.traversable.sum(), "all but pockets behind furniture"
         for room in plan.labels:
             spots = plan.frame.xy(np.argwhere(main))
             assert np.linalg.norm(spots - [room.x, room.y], axis=1).min() < 2.0, f"{room.name} is shut off"

@@ -8,7 +8,6 @@ from scipy.ndimage import distance_transform_edt
 
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import BODY_HEIGHT, measure_clearance
-from vinl.world.free_space import FIT_RADIUS
 from vinl.world.grid import GridFrame
 from vinl.world.homes.furnish import Piece
 from vinl.world.homes.rooms import Rect, Room
@@ -16,6 +15,10 @@ from vinl.world.raster import find_cells, label_regions, paint_boxes
 
 CHECKED_AT = 0.1
 """Side of the cells that ways are checked on [m]. A way that is wide enough on these is wide enough on finer ones."""
+
+CHECKED_RADIUS = 0.349
+"""Radius that ways are checked for on the coarse cells [m]. Straight gaps of seven cells pass, so every door does;
+between corners, of which the cells may miss the tips, it leaves room for ``free_space.FIT_RADIUS``."""
 
 POCKET = 0.25
 """Floor cut off from the rest that is let be [m2]: the spot behind an open bedside."""
@@ -30,7 +33,7 @@ ROUNDS = 12
 def keep_connected(
     rooms: list[Room], walls: Boxes, pieces: list[Piece], inside: Bool[np.ndarray, "rows columns"], frame: GridFrame
 ) -> list[Piece] | None:
-    """The pieces that may stay, so that a robot of ``FIT_RADIUS`` reaches every room and all floor but pockets.
+    """The pieces that may stay, so that a robot of ``FIT_RADIUS`` reaches every room, and all floor but pockets.
 
     Args:
         rooms: of the home.
@@ -51,7 +54,7 @@ def keep_connected(
         free = floor.copy()
         for k in kept:
             free.flat[cells[k]] = False
-        fits = measure_clearance(free, frame.resolution) >= FIT_RADIUS
+        fits = measure_clearance(free, frame.resolution) >= CHECKED_RADIUS
         regions = label_regions(fits)
         if not regions.any():
             return None
@@ -121,7 +124,7 @@ def _blame(regions: np.ndarray, main: int, bad: set[int], cells: list, kept: set
 
 
 def _joined(floor: np.ndarray, frame: GridFrame, windows: list[tuple[slice, slice]], owners: list[int]) -> bool:
-    regions = label_regions(measure_clearance(floor, frame.resolution) >= FIT_RADIUS)
+    regions = label_regions(measure_clearance(floor, frame.resolution) >= CHECKED_RADIUS)
     if not regions.any():
         return False
     main = int(np.bincount(regions.ravel())[1:].argmax()) + 1

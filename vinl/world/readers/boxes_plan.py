@@ -42,7 +42,7 @@ def build_boxes_plan(entries: dict[str, Any], name: str, source: str) -> FloorPl
     return assemble_floorplan(str(entries.get("name", name)), source, walls, furniture, inside, frame, windows, labels)
 
 
-def _read(rows: list[list[float]]) -> Boxes:
+def _read(rows: list[Any]) -> Boxes:
     table = np.array(rows, dtype=float)
     if rows and (table.ndim != 2 or table.shape[1] != 7):
         raise InputError("a box needs 7 numbers: x, y, yaw, length, width, bottom, top")

@@ -106,7 +106,7 @@ def _find_enclosed(shut: np.ndarray, frame: GridFrame) -> np.ndarray:
     return inside if inside.sum() >= CLOSED * rolled.sum() else rolled
 
 
-def _to_metres(entries: list[list[float]], scale: float) -> np.ndarray:
+def _to_metres(entries: list[Any], scale: float) -> np.ndarray:
     """Rows x1, y1, x2, y2 in pixels with y down to metres with y up; shape (n, 4)."""
     rows = np.array([[float(v) for v in entry[:4]] for entry in entries]).reshape(-1, 4)
     if not np.isfinite(rows).all():
