@@ -51,16 +51,20 @@ def draw_routes(plan: FloorPlan, count: int, config: EvaluationConfig) -> list[S
     return sample_start_goals(plan, count, make_rng(_START_GOALS, plan.name), config.min_distance, config.clearance)
 
 
+def draw_setup(
+    plan: FloorPlan, route: StartGoal, episode: int, seed: int, clutter: ClutterPreset, config: EvaluationConfig
+) -> EpisodeSetup:
+    """One repetition of one pair: the seed changes clutter, heading and joint angles at the start."""
+    rng = make_rng(_START, plan.name, seed, episode)
+    yaw = float(rng.uniform(-np.pi, np.pi))
+    joints = DEFAULT_POSE + rng.uniform(-config.joint_noise, config.joint_noise, 12)
+    ends = np.stack([route.start, route.goal])
+    blocks = scatter_blocks(plan, clutter, make_rng(_CLUTTER, plan.name, seed, episode), ends)
+    return EpisodeSetup(plan.name, episode, seed, route, yaw, joints, blocks)
+
+
 def draw_setups(
     plan: FloorPlan, routes: list[StartGoal], seed: int, clutter: ClutterPreset, config: EvaluationConfig
 ) -> list[EpisodeSetup]:
-    """One repetition of all pairs: the seed changes clutter, heading and joint angles at the start."""
-    setups = []
-    for k, route in enumerate(routes):
-        rng = make_rng(_START, plan.name, seed, k)
-        yaw = float(rng.uniform(-np.pi, np.pi))
-        joints = DEFAULT_POSE + rng.uniform(-config.joint_noise, config.joint_noise, 12)
-        ends = np.stack([route.start, route.goal])
-        blocks = scatter_blocks(plan, clutter, make_rng(_CLUTTER, plan.name, seed, k), ends)
-        setups.append(EpisodeSetup(plan.name, k, seed, route, yaw, joints, blocks))
-    return setups
+    """One repetition of all pairs."""
+    return [draw_setup(plan, route, k, seed, clutter, config) for k, route in enumerate(routes)]

@@ -95,7 +95,7 @@ def run_episodes(
         for k in alive:
             walkers[k].step(targets[k])
             qpos[k], qvel[k] = walkers[k].qpos, walkers[k].qvel
-        errors = _tracking_errors(qpos, qvel, command)
+        errors = tracking_errors(qpos, qvel, command)
         away = np.linalg.norm(qpos[:, :2] - goals, axis=1)
         for k in list(alive):
             tallies[k].count(step + 1, walkers[k], errors[k])
@@ -128,7 +128,7 @@ def _spawn_walkers(plan: FloorPlan, setups: Sequence[EpisodeSetup], locomotor: P
     return walkers
 
 
-def _tracking_errors(
+def tracking_errors(
     qpos: Float[np.ndarray, "n 19"], qvel: Float[np.ndarray, "n 18"], command: Float[np.ndarray, "n 3"]
 ) -> Float[np.ndarray, "n 2"]:
     """Squared errors of the horizontal velocity in the heading frame [m2/s2] and of the yaw rate [rad2/s2]."""
