@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
+from typing import Literal
 
 from vinl.config.errors import InputError
 from vinl.loco.student_config import StudentConfig
@@ -183,6 +184,8 @@ class PpoConfig:
         map: whether the actor sees the height scan; the critic always does.
         actor, critic, encoder: widths of the hidden layers.
         code: size of the map code that the encoder makes of the height scan [paper III-A].
+        update: whose update: rsl_rl (rsl-rl's own), fast (the same numbers with fewer waits for the device; see
+            ``vinl.rl.fast_ppo``) or graphs (fast, its minibatches as CUDA graphs).
     """
 
     steps: int = 24
@@ -203,6 +206,7 @@ class PpoConfig:
     critic: tuple[int, ...] = (512, 256, 128)
     encoder: tuple[int, ...] = (128, 64)
     code: int = 32
+    update: Literal["rsl_rl", "fast", "graphs"] = "rsl_rl"
 
     def __post_init__(self) -> None:
         if min(self.steps, self.epochs, self.minibatches) < 1:

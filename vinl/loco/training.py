@@ -31,6 +31,9 @@ def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
     sight: dict[str, Any] = {"class_name": "vinl.rl.models:BlindModel"}
     if p.map:
         sight = {"class_name": "vinl.rl.models:MapModel", "encoder": list(p.encoder), "code": p.code}
+    update: dict[str, Any] = {"class_name": "PPO"}
+    if p.update != "rsl_rl":
+        update = {"class_name": "vinl.rl.fast_ppo:FastPPO", "graphs": p.update == "graphs"}
     return {
         "num_steps_per_env": p.steps,
         "obs_groups": {"actor": ["policy"], "critic": ["critic"]},
@@ -42,7 +45,7 @@ def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
         },
         "critic": {"class_name": "MLPModel", "hidden_dims": list(p.critic), "activation": "elu"},
         "algorithm": {
-            "class_name": "PPO",
+            **update,
             "num_learning_epochs": p.epochs,
             "num_mini_batches": p.minibatches,
             "learning_rate": p.learning_rate,
