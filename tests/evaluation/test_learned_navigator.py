@@ -133,3 +133,20 @@ def test_navigators_by_name(tmp_path: Path) -> None:
     navigator = load_navigator(folder, EvaluationConfig())
     assert isinstance(navigator, LearnedNavigator) and navigator.card.name == "guide"
     assert load_policy(folder).camera == navigator.camera
+
+
+def test_last_motion_instead_of_last_action(two_rooms: FloorPlan) -> None:
+    """What the card says it observes: how far the robot came, whatever it asked for."""
+    network = TinyGuide()
+    card = navigation_card("guide", network.describe(), replace(NAVIGATION_CAMERA, height=8, width=12).describe(), True)
+    navigator = LearnedNavigator(DepthPolicy(network, card))
+    task = Task(FreeSpace(two_rooms), sample_start_goals(two_rooms, 1, np.random.default_rng(0), 2.0)[0])
+    navigator.reset([task, task])
+    for pose in ([[1.0, 2.0, 0.0], [0.0, 0.0, np.pi / 2]], [[1.0, 2.0, 0.0], [0.0, 0.4, np.pi / 2 + np.pi / 12]]):
+        goal = np.array([[10.0, 1.0, 0.0], [2.5, 0.0, 1.0]])
+        navigator.act({"goal": goal, "pose": np.array(pose), "depth": torch.full((2, 8, 12), 5.0)})
+    (_, first, _), (_, later, _) = network.seen
+    np.testing.assert_array_equal(first[0, :, 3:], 0.0)
+    # the first stood, the second walked 0.8 m/s and turned by 30 deg/s
+    forward = 0.4 * np.cos(np.pi / 24) / np.sinc(1 / 24) / 0.5
+    np.testing.assert_allclose(later[0, :, 3:], [[-1.0, 0.0], [2 * forward - 1, 0.5]], atol=1e-6)

@@ -34,10 +34,10 @@ def test_vector_ends_and_begins_in_one_step():
     again, _ = envs.reset(seed=3)
     assert all((first[name] == again[name]).all() for name in first)
     assert envs.observation_space.contains(first)
-    still = np.tile(np.array([-1.0, 0.3], np.float32), (6, 1))
+    still = np.tile(np.array([-1.0, 0.6], np.float32), (6, 1))
     for _ in range(4):
         observation, reward, success, timeout, info = envs.step(still)
     assert timeout.all() and not success.any() and reward.shape == (6,)
-    assert (info["final_obs"]["vector"][:, 4] > 0.29).all() and (observation["vector"][:, 3:] == 0).all()
+    assert (info["final_obs"]["vector"][:, 4] > 0).all() and (observation["vector"][:, 3:] == 0).all()
     assert (info["episode"]["steps"] == 4).all() and info["_episode"].all()
     envs.close()

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 
@@ -21,7 +22,8 @@ def test_steps_are_well_formed(config, homes):
         assert all(torch.isfinite(x.float()).all() for x in step)
         assert step.depth.min() >= 0 and step.depth.max() <= 1
         going = ~step.done
-        torch.testing.assert_close(step.vector[going, 3:], action[going].clamp(-1, 1))
+        moved = going & (environment.state["in_a_row"] == 0)
+        torch.testing.assert_close(step.vector[moved, 3:], action[moved].clamp(-1, 1))
         torch.testing.assert_close(step.vector[:, 1:3].norm(dim=1), torch.ones(32))
     measures = environment.read_measures()
     assert measures["blocked"] > 0 and measures["evicted"] == measures["unplaced"] == 0
@@ -67,3 +69,39 @@ def test_time_runs_out(config, homes):
         assert step.done.all() == step.timeout.all() == (k == 4)
     measures = environment.read_measures()
     assert measures["episodes"] == 32 and measures["success"] == 0 and measures["steps"] == 5
+
+
+@pytest.mark.parametrize("previous", ["motion", "action"])
+def test_a_cancelled_step_is_seen_unless_the_paper_asks(config, homes, previous):
+    """A robot that asks for the same step again and again sees that it stands."""
+    environment = NavEnvironment(replace(config, num_envs=300, camera=None, previous=previous), homes)
+    action = torch.tensor([[0.6, 0.2]]).expand(300, 2)
+    for _ in range(12):
+        step = environment.step(action)
+    stopped = (environment.state["in_a_row"] > 0) & ~step.done
+    going = (environment.state["in_a_row"] == 0) & ~step.done
+    assert stopped.sum() > 50 and going.sum() > 5
+    seen = torch.tensor([-1.0, 0.0] if previous == "motion" else [0.6, 0.2])
+    torch.testing.assert_close(step.vector[stopped, 3:], seen.expand(int(stopped.sum()), 2))
+    torch.testing.assert_close(step.vector[going, 3:], action[going])
+    assert (step.vector[step.done, 3:] == 0).all()
+
+
+def test_the_motion_seen_is_what_the_poses_say(config, homes):
+    """The chain measures the same from the poses of the robot's trunk (``vinl.evaluation.odometry``)."""
+    from vinl.evaluation.odometry import measure_twist
+    from vinl.nav.config import ExecutionConfig
+
+    execution = ExecutionConfig(lag=0.1, speed_gain=(0.8, 1.0), yaw_noise=0.2, speed_noise=0.1, side_slip=0.1)
+    environment = NavEnvironment(replace(config, num_envs=200, camera=None, execution=execution), homes)
+
+    def poses():
+        return torch.cat([environment.state["position"], environment.state["yaw"][:, None]], 1).double().numpy()
+
+    for _ in range(3):
+        before = poses()
+        _, done, _ = environment.advance(torch.rand(200, 2) * 2 - 1)
+        twist = measure_twist(before, poses(), 0.5)
+        wanted = torch.tensor(twist[:, [0, 2]] * [2, 3 / np.pi] - [1, 0]).clamp(-1, 1).float()
+        torch.testing.assert_close(environment.observe()[1][:, 3:], wanted, atol=2e-3, rtol=0)
+        environment.restart(done)

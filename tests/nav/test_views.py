@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from vinl.nav.config import CameraConfig, EpisodeConfig, MotionConfig, RewardConfig, ViewConfig
+from vinl.nav.config import CameraConfig, EpisodeConfig, ExecutionConfig, MotionConfig, RewardConfig, ViewConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.sensing.depth import DepthCamera
 from vinl.world.mesh import floorplan_mesh
@@ -43,12 +43,12 @@ def test_camera_moves_as_told(config, homes):
 
     place, pitch, _ = look()
     assert pitch.abs().max() < 1e-6 and (place[:, 2] - 0.36).abs().max() < 1e-6
-    _, pitch, environment = look(shake=0.05)
+    _, pitch, environment = look(shake=(0.0, 0.05))
     assert pitch.std().item() == pytest.approx(0.05, rel=0.15)
     environment.step(torch.zeros(400, 2))
     environment.observe()
     assert np.corrcoef(pitch, environment._eye[1][:, 2, 0].asin())[0, 1] < 0.3
-    place, pitch, environment = look(offset=0.07, height_offset=0.03)
+    place, pitch, environment = look(offset=(0.0, 0.07), height_offset=0.03)
     assert 0.06 < pitch.abs().max() <= 0.0701
     # pitched up by the trunk, a camera 0.35 m ahead rises
     assert (place[:, 2] - 0.36 - 0.35 * pitch.sin()).abs().max() < 0.0301
@@ -59,6 +59,34 @@ def test_camera_moves_as_told(config, homes):
     place, pitch, _ = look(uniform=math.pi / 6, with_trunk=False)
     assert pitch.std().item() == pytest.approx(math.pi / 6 / math.sqrt(3), rel=0.1)
     assert (place[:, 2] - 0.36).abs().max() < 1e-6
+
+
+def test_sway_keeps_on_and_differs_between_episodes(config, homes):
+    """Within an episode neighbouring steps are alike; the amplitude is the episode's; draws know nothing of each
+    other."""
+    motion = MotionConfig(
+        tilt=(0.1, 0.02),
+        offset=(0.05, 0.05),
+        shake=(0.03, 0.03),
+        correlation=0.6,
+        amplitude=(0.0, 2.0),
+        height_offset=0.02,
+        height_shake=0.01,
+    )
+    execution = ExecutionConfig(speed_gain=(0.9, 1.1), yaw_gain=(0.9, 1.1), yaw_drift=0.1, amplitude=(0.0, 1.5))
+    settings = replace(config, num_envs=2000, camera=None, motion=motion, execution=execution)
+    environment = NavEnvironment(settings, homes)
+    state = environment.state
+    drawn = torch.cat([state["gain"], state["mount"], state["amplitude"][:, None], state["sway"]], 1).T.numpy()
+    others = np.corrcoef(drawn) - np.eye(len(drawn))
+    assert np.abs(others).max() < 0.12
+    assert state["mount"][:, :2].mean(0).numpy() == pytest.approx([0.1, 0.02], abs=0.005)
+    assert 0.0 <= state["amplitude"].min() < 0.1 and 1.9 < state["amplitude"].max() <= 2.0
+    before = state["sway"].clone()
+    going = ~environment.step(torch.tensor([[-1.0, 0.3]]).expand(2000, 2)).done
+    pairs = torch.cat([before, state["sway"]], 1)[going].T.numpy()
+    assert np.diag(np.corrcoef(pairs), 3) == pytest.approx(0.6, abs=0.06)
+    assert state["sway"].std(0).numpy() == pytest.approx(1.0, abs=0.06)
 
 
 def test_noise_and_holes(config, homes):

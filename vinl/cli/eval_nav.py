@@ -29,8 +29,10 @@ class Options:
     seed: int = 0
     """Of starts, goals, headings and the camera's motion."""
     motion: str = "walking"
-    """How camera and robot move: walking (as measured on the walking robot), or paper (roll and pitch redrawn within
-    30 deg at each step, perfect execution)."""
+    """How camera and robot move: walking (as recorded from the walking robot on clutter), level (recorded on level
+    ground), steady (not at all), or paper (roll and pitch redrawn within 30 deg at each step, perfect execution)."""
+    clutter: float = 0.0
+    """Share of the homes with blocks that the camera sees and the robot steps over."""
     min_distance: float = 5.0
     """Least geodesic distance from start to goal [m]."""
     max_distance: float = 30.0
@@ -78,7 +80,9 @@ def main(argv: list[str]) -> int:
     if not 0.5 <= options.min_distance <= options.max_distance:
         raise InputError("--min-distance must lie between 0.5 m and --max-distance")
     distance = (options.min_distance, options.max_distance)
-    rules = NavEvaluation(options.episodes, options.seed, options.motion, distance, options.steps)
+    rules = NavEvaluation(
+        options.episodes, options.seed, options.motion, distance, options.steps, clutter=options.clutter
+    )
     policy = load_navigator(options.policy, options.device)
     config = describe_episodes(None if policy is None else policy.card, rules)
     console, begun = Console(), time.monotonic()

@@ -25,13 +25,13 @@ class Options:
     policy.
 
     Ctrl-C saves and stops; --resume goes on. Any setting of the config can be given as key=value, for example
-    ppo.epochs=1 or motion.shake=0.05.
+    ppo.epochs=1 or motion.amplitude=[0,1].
     """
 
     overrides: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
     """Settings of the config as key=value."""
     config: str = "default"
-    """default, paper, blind (shipped configs of nav/), or a YAML file."""
+    """default, paper, blind, compare/wide and so on (shipped configs of nav/), or a YAML file."""
     from_policy: Annotated[str | None, tyro.conf.arg(name="from")] = None
     """Start from the network of this navigator (a shipped name or a folder) or run; its sizes must be the config's."""
     out: str | None = None
@@ -104,7 +104,7 @@ def main(argv: list[str]) -> int:
 
 def _config_source(name: str) -> str:
     """Bare names are those of the shipped navigation configs."""
-    return name if "/" in name or name.endswith((".yaml", ".yml")) else f"nav/{name}"
+    return name if name.startswith("nav/") or name.endswith((".yaml", ".yml")) else f"nav/{name}"
 
 
 def _choose_device(options: Options) -> str:

@@ -1,4 +1,4 @@
-"""A trained navigator in the chain: goal, depth and its own last action in, velocities out."""
+"""A trained navigator in the chain: goal, depth and its own last step in, velocities out."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from jaxtyping import Float
 
 from vinl.config.errors import InputError
 from vinl.evaluation.navigator import Task
-from vinl.policies.card import FORWARD_SPEED, NAVIGATION_TABLE, YAW_RATE, PolicyCard
+from vinl.evaluation.odometry import measure_twist
+from vinl.policies.card import FORWARD_SPEED, NAVIGATION_TABLE, YAW_RATE, PolicyCard, observes_motion
 from vinl.policies.policy import Policy
 from vinl.robot.cameras import Camera
 
@@ -20,15 +21,23 @@ _DISTANCE_SCALE = float(NAVIGATION_TABLE[0]["scale"][0])
 class LearnedNavigator:
     """Drives the robots of a unit by a policy of kind "navigation", without noise.
 
+    A policy whose card lists ``previous_motion`` gets what the robot did since the last decision, from its poses (from
+    odometry, on a robot), as in its training (``vinl.policies.card.PREVIOUS_MOTION``): a robot that walks against a
+    wall reads that it stands. One whose card lists ``previous_action`` gets what it asked for.
+
+    Args:
+        policy: observes (n, 5): distance / 5 m, cosine and sine of the bearing, and its last step; and depth.
+        period: between two decisions [s].
+
     Attributes:
-        policy: observes (n, 5): distance / 5 m, cosine and sine of the bearing, and its last action; and depth.
+        policy: as given.
         camera: the policy's camera, None if it is blind.
 
     Raises:
         InputError: the policy is of another kind.
     """
 
-    def __init__(self, policy: Policy) -> None:
+    def __init__(self, policy: Policy, period: float = 0.5) -> None:
         if policy.card.kind != "navigation":
             raise InputError(
                 f"{policy.card.name} is a {policy.card.kind} policy; a navigator (--nav) is oracle or a navigation "
@@ -39,7 +48,9 @@ class LearnedNavigator:
         action = policy.card.action
         low, high = np.array([action.get("forward_speed", FORWARD_SPEED), action.get("yaw_rate", YAW_RATE)]).T
         self._middle, self._half = (high + low) / 2, (high - low) / 2
+        self._period, self._observes_motion = period, observes_motion(policy.card)
         self._last = np.zeros((0, 2), np.float32)
+        self._pose: np.ndarray | None = None
 
     @property
     def card(self) -> PolicyCard:
@@ -50,11 +61,22 @@ class LearnedNavigator:
         """See ``Navigator.reset``; what it may know about the episodes is left alone."""
         self.policy.reset(len(episodes))
         self._last = np.zeros((len(episodes), 2), np.float32)
+        self._pose = None
 
     def act(self, observation: dict[str, Any]) -> Float[np.ndarray, "n 2"]:
-        """See ``Navigator.act``; reads ``goal`` and ``depth``."""
+        """See ``Navigator.act``; reads ``goal``, ``depth`` and, to see how far the robot came, ``pose``."""
         goal = np.asarray(observation["goal"], np.float32) * np.array([_DISTANCE_SCALE, 1.0, 1.0], np.float32)
+        if self._observes_motion:
+            self._last = self._measure(np.asarray(observation["pose"], np.float64))
         vector = np.concatenate([goal, self._last], 1)
         action = self.policy.act(vector) if self.camera is None else self.policy.act(vector, observation["depth"])
         self._last = np.clip(np.asarray(action, np.float32), -1.0, 1.0)
         return self._middle + self._half * self._last.astype(np.float64)
+
+    def _measure(self, pose: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
+        """The motion since the last decision in units of the action; zero at the first."""
+        before, self._pose = self._pose, pose.copy()
+        if before is None:
+            return np.zeros((len(pose), 2), np.float32)
+        twist = measure_twist(before, pose, self._period)[:, [0, 2]]
+        return np.clip((twist - self._middle) / self._half, -1.0, 1.0).astype(np.float32)

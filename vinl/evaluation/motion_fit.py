@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from vinl.evaluation.odometry import measure_twist
 from vinl.evaluation.trunk_motion import PERIOD, MotionRecord
 from vinl.robot.aliengo import CONTROL_DT
 
@@ -108,13 +109,7 @@ def describe_sway(records: Sequence[MotionRecord]) -> dict[str, Sway]:
 def read_twists(poses: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "steps 3"]:
     """Mean forward [m/s], sideways [m/s] and yaw [rad/s] rates between poses: the constant ones that lead from each to
     the next on an arc."""
-    step = np.diff(poses[:, :2], axis=0)
-    turn = (np.diff(poses[:, 2]) + np.pi) % (2 * np.pi) - np.pi
-    chord = np.sinc(turn / 2 / np.pi)  # chord over arc
-    heading = poses[:-1, 2] + turn / 2
-    c, s = np.cos(heading), np.sin(heading)
-    forward, left = c * step[:, 0] + s * step[:, 1], -s * step[:, 0] + c * step[:, 1]
-    return np.stack([forward / chord, left / chord, turn], 1) / STEP
+    return measure_twist(poses[:-1], poses[1:], STEP)
 
 
 def lag_commands(commands: Float[np.ndarray, "k n"], lag: float) -> Float[np.ndarray, "k n"]:

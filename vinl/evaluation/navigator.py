@@ -15,6 +15,7 @@ from vinl.config.fields import closest
 from vinl.evaluation.config import EvaluationConfig
 from vinl.policies.card import read_card
 from vinl.policies.io import find_policy, list_policies, load_policy
+from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import Camera
 from vinl.world.free_space import FreeSpace
 from vinl.world.start_goal import StartGoal
@@ -48,9 +49,9 @@ class Navigator(Protocol):
         Args:
             observation: ``goal`` (n, 3): straight distance [m], cosine and sine of the bearing in the robot's heading
                 frame, left positive; ``previous_action`` (n, 2): what this returned last, zero at first; ``pose``
-                (n, 3): x, y [m] and yaw [rad], privileged, for oracles; ``depth`` (n, height, width) [m], if the
-                navigator has a camera: a torch tensor that the next step overwrites. Rows of episodes that are over
-                stay, with their last values.
+                (n, 3): x, y [m] and yaw [rad], for oracles, and for odometry: how far it moved since the last decision;
+                ``depth`` (n, height, width) [m], if the navigator has a camera: a torch tensor that the next step
+                overwrites. Rows of episodes that are over stay, with their last values.
         """
         ...
 
@@ -82,7 +83,7 @@ def load_navigator(name: str | Path, config: EvaluationConfig, device: str = "cp
         raise InputError(
             f"unknown navigator {str(name)!r}{closest(bare, known)}; known: {', '.join(known)}; or give a policy folder"
         )
-    return LearnedNavigator(load_policy(name, device))
+    return LearnedNavigator(load_policy(name, device), config.navigation_period * CONTROL_DT)
 
 
 def check_choice(choice: Any, n: int, navigator: Navigator) -> Float[np.ndarray, "n 2"]:

@@ -12,6 +12,9 @@ from vinl.robot.cameras import Camera
 from vinl.world.homes.config import HomeConfig
 
 Range = tuple[float, float]
+Pair = tuple[float, float]
+
+PREVIOUS = ("action", "motion")
 
 
 def _check_range(name: str, value: Range, least: float = -math.inf, most: float = math.inf) -> None:
@@ -161,28 +164,41 @@ class CameraConfig:
 
 @dataclass(frozen=True)
 class MotionConfig:
-    """How the camera moves against its resting pose.
+    """How the camera moves against its resting pose; pairs are roll (right side down is positive) and pitch (nose down
+    is positive).
 
     Attributes:
-        offset: roll and pitch of an episode, each uniform within +- this [rad].
-        shake: roll and pitch drawn anew each step, normal with this standard deviation [rad].
+        tilt: mean roll and pitch of the walking trunk [rad].
+        offset: what an episode adds to them, uniform within +- this [rad].
+        shake: standard deviation of the motion within an episode, normal [rad].
+        correlation: of the motion within an episode (height too) from one step of 0.5 s to the next; 0: each step is
+            drawn anew.
+        amplitude: range of a factor of an episode on ``shake`` and ``height_shake``, uniform; 0 is a steady trunk.
         uniform: roll and pitch drawn anew each step, each uniform within +- this [rad] [paper: 30 deg].
         height_offset: height of an episode, uniform within +- this [m].
-        height_shake: height drawn anew each step, standard deviation [m].
+        height_shake: standard deviation of the height within an episode [m].
         with_trunk: roll and pitch turn the trunk, so that the camera ahead of it goes up and down; otherwise the camera
             turns about itself [paper].
     """
 
-    offset: float = 0.0
-    shake: float = 0.0
+    tilt: Pair = (0.0, 0.0)
+    offset: Pair = (0.0, 0.0)
+    shake: Pair = (0.0, 0.0)
+    correlation: float = 0.0
+    amplitude: Range = (1.0, 1.0)
     uniform: float = 0.0
     height_offset: float = 0.0
     height_shake: float = 0.0
     with_trunk: bool = True
 
     def __post_init__(self) -> None:
-        for name in ("offset", "shake", "uniform"):
-            _check_number(f"motion.{name}", getattr(self, name), 0.0, 1.0)
+        for k, axis in enumerate(("roll", "pitch")):
+            _check_number(f"motion.tilt ({axis})", self.tilt[k], -1.0, 1.0)
+            _check_number(f"motion.offset ({axis})", self.offset[k], 0.0, 1.0)
+            _check_number(f"motion.shake ({axis})", self.shake[k], 0.0, 1.0)
+        _check_number("motion.uniform", self.uniform, 0.0, 1.0)
+        _check_number("motion.correlation", self.correlation, 0.0, 0.999)
+        _check_range("motion.amplitude", self.amplitude, 0.0, 10.0)
         for name in ("height_offset", "height_shake"):
             _check_number(f"motion.{name}", getattr(self, name), 0.0, 0.2)
 
@@ -198,6 +214,7 @@ class ExecutionConfig:
             robot at full speed; less in proportion when slower or turning less (half of it when it stands).
         side_slip: standard deviation of a step's mean sideways speed [m/s], in proportion to the forward speed.
         yaw_drift: yaw rate of an episode when walking at full speed, uniform within +- this [rad/s].
+        amplitude: range of a factor of an episode on the noises and the slip, uniform; 0 is sure of foot.
     """
 
     lag: float = 0.0
@@ -207,6 +224,7 @@ class ExecutionConfig:
     yaw_noise: float = 0.0
     side_slip: float = 0.0
     yaw_drift: float = 0.0
+    amplitude: Range = (1.0, 1.0)
 
     def __post_init__(self) -> None:
         _check_number("execution.lag", self.lag, 0.0, 5.0)
@@ -214,6 +232,7 @@ class ExecutionConfig:
         _check_range("execution.yaw_gain", self.yaw_gain, 0.0, 2.0)
         for name in ("speed_noise", "yaw_noise", "side_slip", "yaw_drift"):
             _check_number(f"execution.{name}", getattr(self, name), 0.0, 1.0)
+        _check_range("execution.amplitude", self.amplitude, 0.0, 10.0)
 
 
 @dataclass(frozen=True)
@@ -299,12 +318,15 @@ class NavConfig:
         num_envs: robots in parallel; on each device, where there are several.
         iterations: updates of a training.
         seed: of everything random but the homes.
+        previous: what a robot knows of its last step: ``action`` that it asked for [paper], or its ``motion`` in the
+            same units, (-1, 0) where the step was cancelled.
         camera: null: the robot is blind.
     """
 
     num_envs: int = 4096
     iterations: int = 1000
     seed: int = 1
+    previous: str = "motion"
     homes: HomesConfig = field(default_factory=HomesConfig)
     episodes: EpisodeConfig = field(default_factory=EpisodeConfig)
     robot: RobotConfig = field(default_factory=RobotConfig)
@@ -322,7 +344,7 @@ class NavConfig:
             raise InputError(f"iterations must be at least 1, got {self.iterations}")
         if not 1 <= self.num_envs <= 65536:
             raise InputError(f"num_envs must lie between 1 and 65536, got {self.num_envs}")
-        if self.iterations < 1:
-            raise InputError(f"iterations must be at least 1, got {self.iterations}")
+        if self.previous not in PREVIOUS:
+            raise InputError(f"previous must be one of {', '.join(PREVIOUS)}, got {self.previous!r}")
         if not 0 <= self.seed < 2**31:
             raise InputError(f"seed must lie between 0 and 2147483647, got {self.seed}")

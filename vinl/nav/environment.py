@@ -31,8 +31,11 @@ _STATE = {
     "speed": (torch.float32, (), None),
     "yaw_rate": (torch.float32, (), None),
     "distance": (torch.float32, (), None),
-    "gain": (torch.float32, (3,), wp.vec3),
+    "gain": (torch.float32, (4,), wp.vec4),
     "mount": (torch.float32, (4,), wp.vec4),
+    "amplitude": (torch.float32, (), None),
+    "sway": (torch.float32, (3,), wp.vec3),
+    "previous": (torch.float32, (2,), wp.vec2),
 }
 
 
@@ -42,7 +45,7 @@ class NavStep(NamedTuple):
     Attributes:
         depth: (n, H, W) float16 in [0, 1]; of the new episode where done. (n, 0, 0) if the robots are blind.
         vector: (n, 5) float32: distance to the goal / 5 m, cosine and sine of its bearing (left is positive), and the
-            previous action, 0 at the start; of the new episode where done.
+            previous action or motion (``NavConfig.previous``), 0 at the start; of the new episode where done.
         reward: (n,) float32.
         done: (n,) bool, an episode ended with this step.
         timeout: (n,) bool, it ended for want of time (or because its home was replaced), not at the goal.
@@ -285,7 +288,6 @@ class NavEnvironment:
         )
         for name in ("steps", "path", "collisions", "in_a_row"):
             state[name].masked_fill_(chosen, 0.0)
-        state["action"].masked_fill_(chosen[:, None], 0.0)
         state["start_distance"].copy_(torch.where(chosen, state["distance"], state["start_distance"]))
         self._observation = None
 
@@ -294,7 +296,7 @@ class NavEnvironment:
         to_goal = self.goals() - state["position"]
         bearing = torch.atan2(to_goal[:, 1], to_goal[:, 0]) - state["yaw"]
         distance = torch.linalg.vector_norm(to_goal, dim=1) / DISTANCE_UNIT
-        vector = torch.cat([torch.stack([distance, bearing.cos(), bearing.sin()], 1), state["action"]], 1)
+        vector = torch.cat([torch.stack([distance, bearing.cos(), bearing.sin()], 1), state["previous"]], 1)
         if self.camera is None:
             return torch.zeros(n, 0, 0, dtype=torch.float16, device=self.device), vector
         depth = torch.empty(n, self.camera.height, self.camera.width, dtype=torch.float16, device=self.device)

@@ -19,13 +19,19 @@ from vinl.nav.environment import NavEnvironment
 from vinl.nav.follower import PathFollower
 from vinl.nav.home_store import HomeStore
 from vinl.nav.measures import EpisodeEnd
-from vinl.policies.card import PolicyCard
+from vinl.policies.card import PolicyCard, observes_motion
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.world.readers import load_floorplan, shipped_floorplans
 
-MOTIONS = {"walking": "nav/default", "paper": "nav/paper"}
-"""How the camera moves, and the config that says it: as on the walking robot, or redrawn at each step [paper]."""
+MOTIONS = {
+    "walking": "nav/motion/walking",
+    "level": "nav/motion/level",
+    "steady": "nav/motion/steady",
+    "paper": "nav/paper",
+}
+"""How camera and robot move, and the config that says it: as recorded from the walking robot on clutter or on level
+ground, not at all, or redrawn at each step [paper]."""
 
 ORACLE = "oracle"
 END_REASONS = ("success", "stuck", "looping", "timeout")
@@ -46,6 +52,7 @@ class NavEvaluation:
         distance: range of the geodesic distance at the start [m].
         steps: an episode ends after so many decisions of 0.5 s [paper code: 250].
         goals: in each home.
+        clutter: share of the homes with blocks that are seen but stop no robot.
     """
 
     episodes: int = 1000
@@ -54,6 +61,7 @@ class NavEvaluation:
     distance: tuple[float, float] = (5.0, 30.0)
     steps: int = 250
     goals: int = 8
+    clutter: float = 0.0
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 65536:
@@ -62,6 +70,8 @@ class NavEvaluation:
             raise InputError(f"--seed must lie between 0 and 2147483647, got {self.seed}")
         if self.motion not in MOTIONS:
             raise InputError(f"--motion must be one of {', '.join(MOTIONS)}, got {self.motion!r}")
+        if not 0 <= self.clutter <= 1:
+            raise InputError(f"--clutter must lie between 0 and 1, got {self.clutter:g}")
         if self.steps < 1:
             raise InputError(f"--steps must be at least 1, got {self.steps}")
 
@@ -176,7 +186,8 @@ def name_kind(path: str) -> str:
 
 
 def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfig:
-    """The environment of an evaluation: the policy's camera, the motion and execution of ``rules.motion``.
+    """The environment of an evaluation: the policy's camera and memory of its last step, the motion and execution of
+    ``rules.motion``. The walking robot carries the camera as high as it walks, whatever the training took.
 
     Args:
         card: of the navigator; None: blind (the oracle).
@@ -187,13 +198,25 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
     if card is not None and card.camera is not None:
         trained = card.training.get("camera") or {}
         known = {k: card.camera[k] for k in ("pitch_down", "hfov", "width", "height", "far")}
-        mount = {"mount_height": trained["mount_height"]} if "mount_height" in trained else {}
+        assert config.camera is not None
+        mount = {"mount_height": config.camera.mount_height}
+        if rules.motion == "paper" and "mount_height" in trained:
+            mount = {"mount_height": trained["mount_height"]}
         camera = build_config(CameraConfig, {**known, "forward": card.camera["position"][0], **mount}, source="card")
     episodes: EpisodeConfig = replace(
         config.episodes, distance=rules.distance, steps=rules.steps, start_speed=(0.0, 0.0)
     )
     homes = replace(config.homes, goals=rules.goals, starts=512, fresh=0.0, plans=(), plans_share=0.0)
-    return replace(config, num_envs=rules.episodes, seed=rules.seed, camera=camera, episodes=episodes, homes=homes)
+    return replace(
+        config,
+        num_envs=rules.episodes,
+        seed=rules.seed,
+        previous="motion" if card is not None and observes_motion(card) else "action",
+        camera=camera,
+        episodes=episodes,
+        homes=homes,
+        clutter=replace(config.clutter, share=rules.clutter),
+    )
 
 
 def build_homes(

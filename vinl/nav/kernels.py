@@ -50,8 +50,11 @@ class Robots:
     speed: wp.array(dtype=wp.float32)
     yaw_rate: wp.array(dtype=wp.float32)
     distance: wp.array(dtype=wp.float32)
-    gain: wp.array(dtype=wp.vec3)  # of forward speed and yaw rate, and yaw drift
+    gain: wp.array(dtype=wp.vec4)  # of forward speed and yaw rate, yaw drift [rad/s], and factor on the noises
     mount: wp.array(dtype=wp.vec4)  # roll, pitch, height of this episode's camera, height of the ceiling (0: none)
+    amplitude: wp.array(dtype=wp.float32)  # of this episode's sway
+    sway: wp.array(dtype=wp.vec3)  # roll, pitch and height within the episode, each of variance 1
+    previous: wp.array(dtype=wp.vec2)  # what the robot knows of its last step
 
 
 @wp.struct
@@ -75,8 +78,13 @@ class Rules:
     yaw_noise: wp.float32
     side_slip: wp.float32
     yaw_drift: wp.float32
-    tilt_offset: wp.float32
-    tilt_shake: wp.float32
+    execution_amplitude: wp.vec2
+    sees_motion: wp.int32
+    tilt: wp.vec2
+    tilt_offset: wp.vec2
+    tilt_shake: wp.vec2
+    correlation: wp.float32
+    amplitude: wp.vec2
     tilt_uniform: wp.float32
     height_offset: wp.float32
     height_shake: wp.float32
@@ -173,9 +181,10 @@ def touches(homes: Homes, home: wp.int32, p: wp.vec2, yaw: wp.float32, length: w
 
 @wp.func
 @no_type_check
-def spread_uniform(state: wp.uint32, between: wp.vec2) -> wp.float32:
-    """Uniform within a range."""
-    return between[0] + (between[1] - between[0]) * wp.randf(state)
+def mix(between: wp.vec2, share: wp.float32) -> wp.float32:
+    """From one end of a range to the other. Draws stay in the kernels: a function gets a copy of the random state, and
+    what follows it would draw the same numbers again."""
+    return between[0] + (between[1] - between[0]) * share
 
 
 @wp.kernel
@@ -214,10 +223,11 @@ def move_robots(
     v_end = v_told + (robots.speed[n] - v_told) * last
     w_end = w_told + (robots.yaw_rate[n] - w_told) * last
     pace = v / rules.max_speed
-    v = wp.max(v + rules.speed_noise * wp.randn(state) * pace, 0.0)
-    slip = rules.side_slip * wp.randn(state) * pace
+    noisy = gain[3] * pace
+    v = wp.max(v + rules.speed_noise * wp.randn(state) * noisy, 0.0)
+    slip = rules.side_slip * wp.randn(state) * noisy
     turning = 0.5 + 0.5 * wp.min(wp.max(pace, wp.abs(w) / rules.max_yaw_rate), 1.0)
-    w = w + gain[2] * pace + rules.yaw_noise * wp.randn(state) * turning
+    w = w + gain[2] * pace + rules.yaw_noise * wp.randn(state) * gain[3] * turning
 
     start = robots.position[n]
     yaw = robots.yaw[n]
@@ -245,10 +255,22 @@ def move_robots(
     if hit:
         p = start
         heading = yaw
-        v_end = 0.0
-        w_end = 0.0
+        v = float(0.0)
+        w = float(0.0)
+        v_end = float(0.0)
+        w_end = float(0.0)
         moved[n] = 0.0
         blocked[n] = 1.0
+    robots.previous[n] = wp.vec2(a0, a1)
+    if rules.sees_motion != 0:
+        robots.previous[n] = wp.vec2(
+            wp.clamp(2.0 * v / rules.max_speed - 1.0, -1.0, 1.0), wp.clamp(w / rules.max_yaw_rate, -1.0, 1.0)
+        )
+    left = wp.sqrt(1.0 - rules.correlation * rules.correlation)
+    new_roll = left * wp.randn(state)
+    new_pitch = left * wp.randn(state)
+    new_height = left * wp.randn(state)
+    robots.sway[n] = rules.correlation * robots.sway[n] + wp.vec3(new_roll, new_pitch, new_height)
     robots.position[n] = p
     robots.yaw[n] = wp.atan2(wp.sin(heading), wp.cos(heading))
     robots.speed[n] = v_end
@@ -309,16 +331,24 @@ def place_robots(
             robots.distance[n] = distance
             if not (ranged and free):
                 unplaced[n] = unplaced[n] + 1.0
-    robots.speed[n] = spread_uniform(state, rules.start_speed)
+    robots.speed[n] = mix(rules.start_speed, wp.randf(state))
     robots.yaw_rate[n] = 0.0
     drift = rules.yaw_drift * (2.0 * wp.randf(state) - 1.0)
-    robots.gain[n] = wp.vec3(spread_uniform(state, rules.speed_gain), spread_uniform(state, rules.yaw_gain), drift)
-    roll = rules.tilt_offset * (2.0 * wp.randf(state) - 1.0)
-    pitch = rules.tilt_offset * (2.0 * wp.randf(state) - 1.0)
+    speed_gain = mix(rules.speed_gain, wp.randf(state))
+    yaw_gain = mix(rules.yaw_gain, wp.randf(state))
+    robots.gain[n] = wp.vec4(speed_gain, yaw_gain, drift, mix(rules.execution_amplitude, wp.randf(state)))
+    robots.previous[n] = wp.vec2(0.0, 0.0)
+    robots.amplitude[n] = mix(rules.amplitude, wp.randf(state))
+    sway_roll = wp.randn(state)
+    sway_pitch = wp.randn(state)
+    sway_height = wp.randn(state)
+    robots.sway[n] = wp.vec3(sway_roll, sway_pitch, sway_height)
+    roll = rules.tilt[0] + rules.tilt_offset[0] * (2.0 * wp.randf(state) - 1.0)
+    pitch = rules.tilt[1] + rules.tilt_offset[1] * (2.0 * wp.randf(state) - 1.0)
     height = rules.height_offset * (2.0 * wp.randf(state) - 1.0)
     ceiling = float(0.0)
     if wp.randf(state) < rules.ceiling_share:
-        ceiling = spread_uniform(state, rules.ceiling)
+        ceiling = mix(rules.ceiling, wp.randf(state))
     robots.mount[n] = wp.vec4(roll, pitch, height, ceiling)
 
 
@@ -336,9 +366,10 @@ def aim_cameras(
     n = wp.tid()
     state = wp.rand_init(seed[0] + 4 * seed[1] + 2, n)
     mount = robots.mount[n]
-    roll = mount[0] + rules.tilt_shake * wp.randn(state) + rules.tilt_uniform * (2.0 * wp.randf(state) - 1.0)
-    pitch = mount[1] + rules.tilt_shake * wp.randn(state) + rules.tilt_uniform * (2.0 * wp.randf(state) - 1.0)
-    height = rules.mount_height + mount[2] + rules.height_shake * wp.randn(state)
+    sway = robots.amplitude[n] * robots.sway[n]
+    roll = mount[0] + rules.tilt_shake[0] * sway[0] + rules.tilt_uniform * (2.0 * wp.randf(state) - 1.0)
+    pitch = mount[1] + rules.tilt_shake[1] * sway[1] + rules.tilt_uniform * (2.0 * wp.randf(state) - 1.0)
+    height = rules.mount_height + mount[2] + rules.height_shake * sway[2]
     yaw = robots.yaw[n]
     cy = wp.cos(yaw)
     sy = wp.sin(yaw)

@@ -29,7 +29,15 @@ def write_rules(config: NavConfig) -> Any:
     rules.speed_gain, rules.yaw_gain = wp.vec2(*execution.speed_gain), wp.vec2(*execution.yaw_gain)
     rules.speed_noise, rules.yaw_noise = execution.speed_noise, execution.yaw_noise
     rules.side_slip, rules.yaw_drift = execution.side_slip, execution.yaw_drift
-    rules.tilt_offset, rules.tilt_shake, rules.tilt_uniform = motion.offset, motion.shake, motion.uniform
+    rules.execution_amplitude = wp.vec2(*execution.amplitude)
+    rules.sees_motion = int(config.previous == "motion")
+    rules.tilt, rules.tilt_offset, rules.tilt_shake = (
+        wp.vec2(*motion.tilt),
+        wp.vec2(*motion.offset),
+        wp.vec2(*motion.shake),
+    )
+    rules.correlation, rules.amplitude = motion.correlation, wp.vec2(*motion.amplitude)
+    rules.tilt_uniform = motion.uniform
     rules.height_offset, rules.height_shake = motion.height_offset, motion.height_shake
     rules.with_trunk = int(motion.with_trunk)
     rules.ceiling_share, rules.ceiling = view.ceiling_share, wp.vec2(*view.ceiling)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -125,7 +126,7 @@ def train_navigator(
     if device.startswith("cuda"):
         torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = torch.backends.cudnn.benchmark = True
     torch.manual_seed(config.seed + peers.rank)
-    own = separate(config, peers.rank)
+    own = separate(config, peers.rank, peers.count)
     environment = build_environment(own, device, peers)
     algorithm = build_algorithm(config, device, peers, None if start is None else start[0])
     commit = find_commit()
@@ -166,6 +167,7 @@ def train_navigator(
     try:
         return loop.train(iterations or config.iterations)
     finally:
+        environment.homes.close()
         peers.close()
 
 
@@ -195,9 +197,12 @@ def check_minibatches(config: NavConfig) -> None:
         )
 
 
-def separate(config: NavConfig, rank: int) -> NavConfig:
-    """The configuration with a process's own homes and random numbers."""
-    homes = replace(config.homes, seed=config.homes.seed + rank * _SEEDS_BETWEEN)
+def separate(config: NavConfig, rank: int, count: int = 1) -> NavConfig:
+    """The configuration with a process's own homes and random numbers, and its share of the cores."""
+    workers = config.homes.workers
+    if workers is None and count > 1:
+        workers = max((os.cpu_count() or 1) // count - 1, 1)
+    homes = replace(config.homes, seed=config.homes.seed + rank * _SEEDS_BETWEEN, workers=workers)
     return replace(config, seed=config.seed + rank, homes=homes)
 
 
@@ -315,4 +320,13 @@ def make_card(
         network = build_actor(config).describe()
     training = {**dump_config(config), **({"origin": origin} if origin else {})}
     camera = config.camera.record().describe() if config.camera is not None else None
-    return navigation_card(name, network, camera, training=training, seed=config.seed, samples=samples, commit=commit)
+    return navigation_card(
+        name,
+        network,
+        camera,
+        config.previous == "motion",
+        training=training,
+        seed=config.seed,
+        samples=samples,
+        commit=commit,
+    )

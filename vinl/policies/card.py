@@ -72,6 +72,11 @@ NAVIGATION_TABLE: tuple[dict[str, Any], ...] = (
 """What a navigator observes beside depth: straight distance to the goal, its bearing in the heading frame (left is
 positive), and its last action, held to [-1, 1], zero when an episode begins."""
 
+PREVIOUS_MOTION: dict[str, Any] = {"name": "previous_motion", "size": 2, "scale": [1.0], "unit": "1"}
+"""What a navigator may observe in the place of its last action: how the robot moved meanwhile, as the action that asks
+for just that: (2 x mean forward speed / (1 m/s) - 1, mean yaw rate / (60 deg/s)), held to [-1, 1]; (-1, 0) is a robot
+that stood or was stopped. Zero when an episode begins."""
+
 FORWARD_SPEED = (0.0, 1.0)
 """Forward speed at the actions -1 and 1 [m/s] [paper]."""
 
@@ -99,10 +104,23 @@ def locomotion_card(
     return PolicyCard("locomotion", name, network, table, action or describe_action(), **rest)
 
 
-def navigation_card(name: str, network: dict[str, Any], camera: dict[str, Any] | None, **rest: Any) -> PolicyCard:
-    """A navigation card with the table and the action scaling that ``NavActor`` has; ``rest`` are further fields."""
+def navigation_table(motion: bool = False) -> list[dict[str, Any]]:
+    """What a navigator observes; ``motion``: with ``PREVIOUS_MOTION`` in the place of the last action."""
+    return [dict(row) for row in (*NAVIGATION_TABLE[:2], PREVIOUS_MOTION if motion else NAVIGATION_TABLE[2])]
+
+
+def observes_motion(card: PolicyCard) -> bool:
+    """Whether a navigator observes how the robot moved, instead of its last action."""
+    return any(row.get("name") == PREVIOUS_MOTION["name"] for row in card.observation)
+
+
+def navigation_card(
+    name: str, network: dict[str, Any], camera: dict[str, Any] | None, motion: bool = False, **rest: Any
+) -> PolicyCard:
+    """A navigation card with the table and the action scaling that ``NavActor`` has; ``motion`` as for
+    ``navigation_table``, ``rest`` are further fields."""
     action = {"forward_speed": list(FORWARD_SPEED), "yaw_rate": list(YAW_RATE)}
-    return PolicyCard("navigation", name, network, [dict(row) for row in NAVIGATION_TABLE], action, camera, **rest)
+    return PolicyCard("navigation", name, network, navigation_table(motion), action, camera, **rest)
 
 
 def write_card(folder: Path, card: PolicyCard) -> None:
