@@ -23,7 +23,8 @@ def test_eval_writes_figures_and_report(policy: str, capsys: pytest.CaptureFixtu
         f"--floorplans {PLAN} --loco {policy} --episodes 1 --seeds 1 --workers 1 --set time_limit=0.5 --out runs/a"
     )
     assert main(["eval", *options.split()]) == 0
-    assert sorted(path.name for path in Path("runs/a").iterdir()) == ["report.html", "results.json"]
+    written = ["episodes.jsonl", "plans", "report.html", "results.json", "run.json"]
+    assert sorted(path.name for path in Path("runs/a").iterdir()) == written
     data = json.loads(Path("runs/a/results.json").read_text())
     assert data["aggregate"]["episodes"] == 1
     assert data["config"]["evaluation"]["time_limit"] == 0.5
@@ -49,6 +50,8 @@ def test_eval_loco_writes_figures(policy: str) -> None:
         ("eval --out a --set time_limit=-1", "time_limit"),
         ("eval --out a --set tim_limit=1", "did you mean"),
         ("eval --out a --device cuda", "cuda"),
+        ("eval --out a --shard 3/2", "--shard 3/2"),
+        ("eval --out a --shard half", "of the form 2/5"),
         ("eval --out taken", "is a file"),
         ("eval", "--out"),
         ("eval-loco --out a --robots -1", "--robots"),

@@ -40,6 +40,12 @@ class Options:
     """Film all episodes of the first seed."""
     workers: int | None = None
     """Processes; the number of cores by default. Results do not depend on it."""
+    shard: str = "1/1"
+    """Which share of the episodes is walked here, for example 2/5: the second of five. ``vinl report`` puts the folders
+    of all shares together."""
+    fresh: bool = False
+    """Begin anew: forget what an earlier run left in the folder. Otherwise the same command goes on where it was
+    interrupted."""
     device: str = "cpu"
     """Device of the policies: cpu or cuda. Only cpu repeats bit for bit."""
     resolution: float | None = None
@@ -59,12 +65,13 @@ def main(argv: list[str]) -> int:
 
     from vinl.config.loader import load_config
     from vinl.evaluation.config import EvaluationConfig
-    from vinl.evaluation.evaluate import Films, check_numbers, evaluate
+    from vinl.evaluation.evaluate import Films, Protocol, check_numbers, evaluate_rows, name_apart
     from vinl.evaluation.navigator import load_navigator
     from vinl.evaluation.progress import Progress
     from vinl.evaluation.report import write_report
     from vinl.evaluation.results_file import check_out, results_as_dict, strip_command, write_json
     from vinl.evaluation.summary import print_summary
+    from vinl.evaluation.work import Row, Shard
     from vinl.policies.io import load_policy
     from vinl.world.readers import load_floorplans
 
@@ -72,30 +79,21 @@ def main(argv: list[str]) -> int:
     workers = os.cpu_count() or 1 if options.workers is None else options.workers
     films: Films = "all" if options.video_all else "first" if options.video else "none"
     check_numbers(options.episodes, options.seeds, options.first_seed, options.obstacles, workers)
+    shard = Shard.parse(options.shard)
     config = load_config(EvaluationConfig, options.config, options.set)
     policy = load_policy(options.loco, options.device)
     navigator = load_navigator(options.nav, config, options.device)
     plans = load_floorplans(options.floorplans, options.resolution, options.min_speck)
     if not plans:
         raise InputError("no floor plan is shipped with this version; give files: --floorplans FILE")
+    seeds = range(options.first_seed, options.first_seed + options.seeds)
+    protocol = Protocol(name_apart(plans), options.episodes, seeds, config, shard, films)
+    row = Row(policy, navigator, options.obstacles)
+    command = ["vinl", "eval", *strip_command(argv)]
     console = Console()
-    with Progress(console) as progress:
-        results = evaluate(
-            plans,
-            policy,
-            navigator,
-            options.episodes,
-            options.seeds,
-            options.first_seed,
-            options.obstacles,
-            config,
-            workers,
-            films,
-            out,
-            progress.show,
-        )
-    data = results_as_dict(results, ["vinl", "eval", *strip_command(argv)], workers)
-    write_json(out / "results.json", data)
-    write_report(out / "report.html", results, shlex.join(data["command"]))
+    with Progress(console, f"{out} keeps them; the same command goes on from there") as progress:
+        results = evaluate_rows([row], protocol, workers, [out], True, options.fresh, command, progress.show)[0]
+    write_json(out / "results.json", results_as_dict(results, command, workers, shard))
+    write_report(out / "report.html", results, shlex.join(command))
     print_summary(console, results, out)
     return 0

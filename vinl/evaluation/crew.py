@@ -9,7 +9,7 @@ import queue
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import torch
@@ -17,6 +17,8 @@ import torch
 T = TypeVar("T")
 POLL = 0.1
 """Seconds between two looks at the workers' messages."""
+PATIENCE = 60.0
+"""Seconds to wait for a message that a worker has sent."""
 
 
 @dataclass(frozen=True)
@@ -25,12 +27,12 @@ class Context:
 
     Attributes:
         shared: what ``Crew`` was made with.
-        tell: report one finished piece of work.
+        tell: report one finished piece of work, and hand over what it gave, if anything.
         is_stopped: whether the user wants to stop.
     """
 
     shared: Any
-    tell: Callable[[], None]
+    tell: Callable[..., None]
     is_stopped: Callable[[], bool]
 
 
@@ -67,28 +69,33 @@ class Crew:
         self._messages.cancel_join_thread()
         self._messages.close()
 
-    def run(self, work: Callable[[Context, Any], T], jobs: list[Any], on_piece: Callable[[], None]) -> list[T]:
-        """All jobs; the answers in the order of the jobs. ``on_piece`` is called for each piece that a job reports."""
+    def run(self, work: Callable[[Context, Any], T], jobs: list[Any], on_piece: Callable[..., None]) -> list[T]:
+        """All jobs; the answers in the order of the jobs. ``on_piece`` is called for each piece that a job reports,
+        with what was handed over. Pieces of finished jobs have all been reported when this returns."""
         if self._pool is None:
             with one_thread():
                 context = Context(self._shared, on_piece, lambda: False)
                 return [work(context, job) for job in jobs]
         futures = [self._pool.submit(_run, work, job) for job in jobs]
-        open_ = set(futures)
+        open_, heard = set(futures), 0
         while open_:
             done, open_ = wait(open_, timeout=POLL, return_when=FIRST_COMPLETED)
-            self._drain(on_piece)
+            heard += self._drain(on_piece)
             for future in done:
                 future.result()  # the first failure ends it all
-        answers = [future.result() for future in futures]
-        self._drain(on_piece)
-        return answers
+        answers, told = zip(*(future.result() for future in futures), strict=True) if futures else ((), ())
+        while heard < sum(told):  # an answer may overtake the last messages
+            on_piece(*self._messages.get(timeout=PATIENCE))
+            heard += 1
+        return list(answers)
 
-    def _drain(self, on_piece: Callable[[], None]) -> None:
+    def _drain(self, on_piece: Callable[..., None]) -> int:
+        heard = 0
         with contextlib.suppress(queue.Empty):
             while True:
-                self._messages.get_nowait()
-                on_piece()
+                on_piece(*self._messages.get_nowait())
+                heard += 1
+        return heard
 
 
 @contextlib.contextmanager
@@ -110,9 +117,17 @@ def _start(shared: bytes, messages: Any, stop: Any) -> None:
     global _context
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     torch.set_num_threads(1)
-    _context = Context(pickle.loads(shared), lambda: messages.put(1), stop.is_set)
+    _context = Context(pickle.loads(shared), lambda *piece: messages.put(piece), stop.is_set)
 
 
-def _run(work: Callable[[Context, Any], T], job: Any) -> T:
+def _run(work: Callable[[Context, Any], T], job: Any) -> tuple[T, int]:
+    """The job's answer, and how many pieces it reported."""
     assert _context is not None
-    return work(_context, job)
+    told, tell = 0, _context.tell
+
+    def count(*piece: Any) -> None:
+        nonlocal told
+        told += 1
+        tell(*piece)
+
+    return work(replace(_context, tell=count), job), told

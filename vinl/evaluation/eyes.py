@@ -28,6 +28,7 @@ class Eyes:
     def __init__(self, meshes: Sequence[Mesh], worlds: Sequence[int], camera: Camera) -> None:
         self.camera = camera
         self._depth = DepthCamera(meshes, camera)
+        self._mount, self._turn = np.array(camera.position), camera.rotation()
         self._worlds = np.asarray(worlds, dtype=np.int32)
         self._images = torch.full((len(worlds), camera.height, camera.width), camera.far)
 
@@ -44,13 +45,21 @@ class Eyes:
             (n, height, width), overwritten by the next call.
         """
         if rows is None or len(rows) == len(self._worlds):
-            trunk = matrix_of(np, qpos[:, 3:7])
-            return self._depth.render(self._worlds, qpos[:, :3], trunk, out=self._images)
+            return self._depth.render_poses(self._worlds, *self._place(qpos), out=self._images)
         if len(rows):
-            at = qpos[list(rows), :7]
-            seen = self._depth.render(self._worlds[list(rows)], at[:, :3], matrix_of(np, at[:, 3:7]))
-            self._images[torch.as_tensor(rows)] = seen
+            chosen = list(rows)
+            seen = self._depth.render_poses(self._worlds[chosen], *self._place(qpos[chosen]))
+            self._images[torch.as_tensor(chosen)] = seen
         return self._images
+
+    def _place(self, qpos: Float[np.ndarray, "n 19"]) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3 3"]]:
+        """Position and orientation of the cameras. Written out, not as matrix products: a library's product may round
+        otherwise for another number of robots, and an image must depend on its own robot alone."""
+        trunk = matrix_of(np, qpos[:, 3:7])
+        columns = [trunk[:, :, k] for k in range(3)]
+        at = qpos[:, :3] + sum(column * self._mount[k] for k, column in enumerate(columns))
+        turned = sum(column[:, :, None] * self._turn[k] for k, column in enumerate(columns))
+        return at, np.asarray(turned)
 
 
 def open_eyes(plan: FloorPlan, blocks: Sequence[Blocks], camera: Camera, ceiling: float | None = None) -> Eyes:

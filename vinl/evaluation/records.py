@@ -11,6 +11,9 @@ from jaxtyping import Float
 from vinl.world.floorplan import FloorPlan
 
 SUCCESS, FALL, TIMEOUT, STUCK = "success", "fall", "timeout", "stuck"
+Key = tuple[str, int, int]
+"""What tells an episode from all others of a row: name of the plan, seed, number of the start/goal pair."""
+
 END_REASONS = (SUCCESS, FALL, TIMEOUT, STUCK)
 """How an episode ends. ``stuck`` is a time-out of a robot that no longer got anywhere."""
 
@@ -70,14 +73,20 @@ class EpisodeRecord:
     yaw_rate_rmse: float
     note: str = ""
 
+    @property
+    def key(self) -> Key:
+        """Plan, seed and number."""
+        return self.plan, self.seed, self.episode
+
 
 @dataclass(frozen=True, eq=False)
 class EpisodeTrace:
     """What drawings and videos need of an episode.
 
     Attributes:
-        path: (k, 2) the trunk every 0.1 s [m].
-        contacts: (m, 4) time [s], index into ``contact.KINDS``, x, y [m]; one row a control step and kind.
+        path: (k, 2) the trunk every 0.1 s [m], to the millimetre.
+        contacts: (m, 4) time [s], index into ``contact.KINDS``, x, y [m] to the millimetre; one row a control step and
+            kind.
         blocks: (b, 6) rows of ``Blocks``.
         poses: (f, 19) qpos every 0.04 s, of episodes that a video was asked for; otherwise (0, 19).
         commands: (f, 3) command at those times.

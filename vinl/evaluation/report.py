@@ -8,10 +8,11 @@ from typing import Any
 
 import jinja2
 
+from vinl.evaluation.describe import describe_environment
 from vinl.evaluation.drawing import draw_histogram, draw_map
 from vinl.evaluation.metrics import aggregate_episodes
 from vinl.evaluation.records import EpisodeRecord, Results
-from vinl.evaluation.results_file import describe_environment, write_text
+from vinl.evaluation.results_file import write_text
 
 PAPER_ROWS = (
     ("Paper: ViNL, clutter", "73.6 ± 5.9", "8.19 ± 0.34", "12.1 ± 0.7"),

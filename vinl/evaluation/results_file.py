@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 import tempfile
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from vinl.config.errors import InputError
+from vinl.evaluation.describe import describe_environment as describe_environment
 from vinl.evaluation.metrics import aggregate_episodes
 from vinl.evaluation.records import Results, plain_record
+from vinl.evaluation.shard import Shard
 
 SCHEMA = 1
 """Version of ``results.json``. Names stay; new ones may be added without a new version."""
 
-_PACKAGES = ("vinl", "mujoco", "numpy", "scipy", "scikit-image", "torch", "warp-lang")
+
+_IDLE, _IDLE_FLAGS = ("--out", "--workers", "--shard"), ("--fresh",)
+"""Options, with a value and without, that are left out of the command."""
 
 
-def results_as_dict(results: Results, command: Sequence[str], workers: int) -> dict[str, Any]:
-    """Results as plain data. Two runs with the same seed differ in ``timing`` and ``aggregate.wall_seconds`` only."""
+def results_as_dict(
+    results: Results, command: Sequence[str], workers: int, shard: Shard | None = None
+) -> dict[str, Any]:
+    """Results as plain data. Two runs with the same seed differ in ``timing`` and ``aggregate.wall_seconds`` only.
+
+    A share of the episodes says so in ``shard``; the whole has no such key.
+    """
     records = results.records
     min_metres = results.config["evaluation"]["min_metres"]
     plans = [
@@ -38,6 +45,7 @@ def results_as_dict(results: Results, command: Sequence[str], workers: int) -> d
     return {
         "schema": SCHEMA,
         "command": list(command),
+        **({"shard": str(shard)} if shard is not None and shard.count > 1 else {}),
         "config": results.config,
         "policies": results.policies,
         "environment": describe_environment(),
@@ -48,25 +56,14 @@ def results_as_dict(results: Results, command: Sequence[str], workers: int) -> d
     }
 
 
-def describe_environment() -> dict[str, str]:
-    """Versions that figures may depend on."""
-    found = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
-    for name in _PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
-
-
 def strip_command(argv: Sequence[str]) -> list[str]:
-    """A command line without ``--out`` and ``--workers``, which no figure depends on."""
+    """A command line without what no figure depends on, or what says only which part of them is measured."""
     kept: list[str] = []
     words = iter(argv)
     for word in words:
-        if word in ("--out", "--workers"):
+        if word in _IDLE:
             next(words, None)
-        elif not word.startswith(("--out=", "--workers=")):
+        elif word not in _IDLE_FLAGS and word.split("=")[0] not in _IDLE:
             kept.append(word)
     return kept
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from vinl.evaluation.batches import ask_only, batch_navigator, batch_policy
 from vinl.evaluation.config import EvaluationConfig
 from vinl.evaluation.episodes import EpisodeSetup
 from vinl.evaluation.eyes import open_eyes
@@ -42,14 +43,15 @@ def run_episodes(
     navigator: Navigator,
     config: EvaluationConfig,
     filmed: Collection[int] = (),
-    on_end: Callable[[int], None] = lambda _: None,
+    on_end: Callable[[Episode], None] = lambda _: None,
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> list[Episode]:
     """Run episodes of one plan in lockstep.
 
-    Both policies are always asked for all rows, those of finished episodes too, so that the answer to one row never
-    depends on which others are still under way: the result of a unit is the same in any process. Only images are
-    rendered for the living alone; the others keep their last one.
+    An episode gives the same numbers whichever others it is run with: shipped kinds of policies are asked in batches of
+    a fixed size, for those that still live (``batches``). Policies and navigators of one's own are always asked for all
+    rows, those of finished episodes too; they are then the same as long as they are run with the same others.
+    Images are rendered for the living alone; the others keep their last one.
 
     Args:
         plan: the floor plan.
@@ -58,7 +60,7 @@ def run_episodes(
         navigator: see ``Navigator``.
         config: limits of an episode.
         filmed: rows whose poses are kept.
-        on_end: called with the row of an episode that ended.
+        on_end: called with each episode that ended, in the order in which they end.
         is_stopped: asked before each decision of the navigator.
 
     Raises:
@@ -66,6 +68,7 @@ def run_episodes(
         InputError: a policy answered what is no answer.
     """
     n, space = len(setups), FreeSpace(plan)
+    locomotor, navigator = batch_policy(locomotor), batch_navigator(navigator)
     locomotor.reset(n)
     navigator.reset([Task(space, setup.route) for setup in setups])
     walkers = _spawn_walkers(plan, setups, locomotor)
@@ -75,7 +78,8 @@ def run_episodes(
     goals = np.stack([setup.route.goal for setup in setups])
     tallies = [Tally(setup, space, config, film=k in filmed) for k, setup in enumerate(setups)]
     command, choice, actions = np.zeros((n, 3)), np.zeros((n, 2)), np.zeros((n, 12), np.float32)
-    alive = list(range(n))
+    alive, done = list(range(n)), dict[int, Episode]()
+    ask_only(alive, locomotor, navigator)
     qpos, qvel = np.stack([w.qpos for w in walkers]), np.stack([w.qvel for w in walkers])
     limit = round(config.time_limit / CONTROL_DT)
     for step in range(limit):
@@ -108,10 +112,11 @@ def run_episodes(
             else:
                 continue
             alive.remove(k)
-            on_end(k)
+            done[k] = tallies[k].close()
+            on_end(done[k])
         if not alive:
             break
-    return [tally.close() for tally in tallies]
+    return [done[k] for k in range(n)]
 
 
 def _spawn_walkers(plan: FloorPlan, setups: Sequence[EpisodeSetup], locomotor: Policy) -> list[Walker]:

@@ -104,8 +104,8 @@ class Tally:
             note=route.note,
         )
         trace = EpisodeTrace(
-            path=np.array([*self._path, self._at]),
-            contacts=np.array(self._contacts, np.float64).reshape(-1, 4),
+            path=np.round(np.array([*self._path, self._at]), 3),
+            contacts=np.round(np.array(self._contacts, np.float64).reshape(-1, 4), 3),
             blocks=setup.blocks.rows,
             poses=np.array(self._poses, np.float64).reshape(-1, 19),
             commands=np.array(self._commands, np.float64).reshape(-1, 3),

@@ -54,8 +54,12 @@ class FilmJob:
     @property
     def name(self) -> str:
         """File name: plan, episode, seed."""
-        record = self.episode.record
-        return re.sub(r"[^\w.-]+", "_", f"{record.plan}_episode{record.episode}_seed{record.seed}") + ".mp4"
+        return name_film(*self.episode.record.key)
+
+
+def name_film(plan: str, seed: int, episode: int) -> str:
+    """File name of the film of an episode."""
+    return re.sub(r"[^\w.-]+", "_", f"{plan}_episode{episode}_seed{seed}") + ".mp4"
 
 
 def film(job: FilmJob, config: EvaluationConfig, is_stopped: Callable[[], bool] = lambda: False) -> str:

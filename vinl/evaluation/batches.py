@@ -1,0 +1,131 @@
+"""Networks asked in batches of one fixed size, so that no answer depends on who else is asked."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from vinl.evaluation.learned_navigator import LearnedNavigator
+from vinl.evaluation.navigator import Navigator
+from vinl.evaluation.oracle import OracleNavigator
+from vinl.policies.card import PolicyCard
+from vinl.policies.depth_policy import DepthNetwork, DepthPolicy, State
+from vinl.policies.policy import LocomotionPolicy, Policy
+from vinl.robot.cameras import Camera
+
+BATCH = 8
+"""Robots in one call of a network on the CPU. Libraries choose another way to add up for other sizes (with torch 2.13
+on an AVX-512 CPU the last bits differ between 1, 2, 3, 4 and 5 rows); at 8, a row's answer depended neither on its
+place nor on the other rows, see docs/evaluation.md."""
+
+
+class BatchedPolicy:
+    """A shipped kind of policy that is asked for some of its robots, always ``BATCH`` in a call.
+
+    A call with fewer robots is filled up with copies of the first. So the answer for a robot depends on that robot
+    alone: not on how many others walk beside it, which of them live, or which worker has it. On a GPU all are asked in
+    one call.
+
+    Args:
+        policy: its network is called directly; the policy's own memory stays untouched.
+
+    Attributes:
+        card, camera: the policy's.
+        rows: numbers of the robots that are asked for, see ``ask_only``; None: all.
+    """
+
+    def __init__(self, policy: DepthPolicy | LocomotionPolicy) -> None:
+        self.card: PolicyCard = policy.card
+        self.camera: Camera | None = policy.camera
+        self.rows: Sequence[int] | None = None
+        self._network = policy.network
+        self._sees = isinstance(policy, DepthPolicy)
+        self._device = policy.device
+        self._state: State = ()
+        self._fresh = torch.zeros(0, dtype=torch.bool)
+        self._answers = np.zeros((0, self._network.action_size), np.float32)
+
+    def reset(self, which: int | Bool[np.ndarray, " n"] | Bool[Tensor, " n"]) -> None:
+        """Forget the past of all of n robots, or of those that a mask marks."""
+        if not isinstance(which, int):
+            self._fresh |= torch.as_tensor(which, device=self._device)
+            return
+        self._fresh = torch.ones(which, dtype=torch.bool, device=self._device)
+        self._answers = np.zeros((which, self._network.action_size), np.float32)
+        if self._sees:
+            self._state = cast(DepthNetwork, self._network).initial_state(which, self._device)
+
+    def act(self, observation: Float[np.ndarray, "n k"], depth: Any = None) -> Float[np.ndarray, "n actions"]:
+        """Actions of the robots in ``rows``; the others keep their last ones.
+
+        Args:
+            observation: (n, k) scaled observations.
+            depth: (n, height, width) [m], if the policy has a camera.
+        """
+        chosen = range(len(observation)) if self.rows is None else self.rows
+        size = BATCH if self._device.type == "cpu" else max(len(chosen), 1)
+        inputs = torch.as_tensor(np.asarray(observation, np.float32), device=self._device)
+        with torch.no_grad():
+            for first in range(0, len(chosen), size):
+                asked = list(chosen[first : first + size])
+                some = torch.tensor(asked + asked[:1] * (size - len(asked)), device=self._device)
+                answer = self._ask(inputs[some], depth, some, len(asked))
+                self._answers[asked] = answer[: len(asked)].cpu().numpy()
+        return self._answers.copy()
+
+    def _ask(self, inputs: Tensor, depth: Any, some: Tensor, count: int) -> Tensor:
+        """One call; the first ``count`` robots are those asked for."""
+        if not self._sees:
+            return self._network(inputs)
+        if self.camera is None:
+            image = torch.zeros(len(some), 1, 1, device=self._device)
+        else:
+            seen = torch.as_tensor(depth)[some.to(depth.device) if isinstance(depth, Tensor) else some]
+            image = self.camera.normalise(seen.to(self._device, torch.float32))
+        state = tuple(part[:, some] for part in self._state)
+        answer, state = self._network(image[None], inputs[None], state, self._fresh[some][None])
+        real = some[:count]
+        for part, new in zip(self._state, state, strict=True):
+            part[:, real] = new[:, :count]
+        self._fresh[real] = False
+        return answer[0]
+
+
+def is_steady(policy: Any) -> bool:
+    """Whether ``BatchedPolicy`` can stand in for a policy: it is of a shipped kind, not of a class of one's own."""
+    return type(policy) in (DepthPolicy, LocomotionPolicy)
+
+
+def batch_policy(policy: Policy) -> Policy:
+    """The policy in fixed batches if it is of a shipped kind, otherwise as it is."""
+    return BatchedPolicy(cast(DepthPolicy, policy)) if is_steady(policy) else policy
+
+
+def batch_navigator(navigator: Navigator) -> Navigator:
+    """The navigator, its policy in fixed batches if it is a learned one of a shipped kind."""
+    if not is_steady_navigator(navigator) or not isinstance(navigator, LearnedNavigator):
+        return navigator
+    seated = copy.copy(navigator)
+    seated.policy = batch_policy(navigator.policy)
+    return seated
+
+
+def is_steady_navigator(navigator: Navigator) -> bool:
+    """Whether a navigator's answer for a robot depends on that robot alone, as far as we know."""
+    if type(navigator) is LearnedNavigator:
+        return is_steady(navigator.policy)
+    return type(navigator) is OracleNavigator
+
+
+def ask_only(rows: Sequence[int], *asked: Policy | Navigator) -> None:
+    """Say which robots still live; policies that are asked for all robots at any time do not care."""
+    for one in asked:
+        policy = one.policy if isinstance(one, LearnedNavigator) else one
+        if isinstance(policy, BatchedPolicy):
+            policy.rows = rows

@@ -1,0 +1,127 @@
+"""What is to be done: which episodes there are, whose share they are, and how they are cut into pieces of work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+from vinl.evaluation.batches import is_steady, is_steady_navigator
+from vinl.evaluation.config import EvaluationConfig
+from vinl.evaluation.crew import Context
+from vinl.evaluation.episodes import draw_setup
+from vinl.evaluation.navigator import Navigator
+from vinl.evaluation.records import Episode, Key
+from vinl.evaluation.rollout import run_episodes
+from vinl.evaluation.shard import Shard
+from vinl.policies.policy import Policy
+from vinl.world.clutter import CLUTTER
+from vinl.world.floorplan import FloorPlan
+from vinl.world.start_goal import StartGoal
+
+LARGEST = 24
+"""Episodes in a piece of work at most: three batches of the networks; the robots of more would wait for each other."""
+
+_PIECES = 4
+"""So many pieces of work for each worker, so that none is idle for long at the end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One line of a table: who walks, through what clutter."""
+
+    locomotor: Policy
+    navigator: Navigator
+    obstacles: str = "none"
+
+
+@dataclass(frozen=True, eq=False)
+class Shared:
+    """What all pieces of work have in common: every worker gets it once."""
+
+    rows: Sequence[Row]
+    plans: Sequence[FloorPlan]
+    routes: Sequence[list[StartGoal]]
+    config: EvaluationConfig
+
+
+@dataclass(frozen=True)
+class Job:
+    """A piece of work: episodes of one row in one plan, which walk side by side.
+
+    Attributes:
+        row, plan: numbers in ``Shared``.
+        cells: seed and number of each episode.
+        filmed: those whose poses are kept.
+        at_once: report them when all have ended, not one by one.
+    """
+
+    row: int
+    plan: int
+    cells: tuple[tuple[int, int], ...]
+    filmed: tuple[tuple[int, int], ...] = ()
+    at_once: bool = False
+
+
+def list_keys(plans: Sequence[FloorPlan], episodes: int, seeds: range, shard: Shard | None = None) -> list[Key]:
+    """All episodes of a row in the order of the results, or those of a share."""
+    keys = [(plan.name, seed, k) for plan in plans for seed in seeds for k in range(episodes)]
+    return [key for number, key in enumerate(keys) if (shard or Shard()).holds(number)]
+
+
+def cut_jobs(
+    row: int,
+    who: Row,
+    plans: Sequence[FloorPlan],
+    wanted: Sequence[Key],
+    missing: Collection[Key],
+    filmed: Collection[Key],
+    workers: int,
+) -> list[Job]:
+    """The pieces of work of a row.
+
+    Where an episode does not depend on those that it is run with, pieces are as large as the number of workers allows.
+    With a policy of one's own they are all episodes of a plan and a seed, whatever is missing of them.
+    """
+    steady = is_steady(who.locomotor) and is_steady_navigator(who.navigator)
+    size = max(1, min(LARGEST, -(-len(missing) // (workers * _PIECES))))
+    jobs = []
+    for number, plan in enumerate(plans):
+        cells = [(seed, k) for name, seed, k in wanted if name == plan.name]
+        lacking = {(seed, k) for name, seed, k in missing if name == plan.name}
+        if steady:
+            cells = [cell for cell in cells if cell in lacking]
+            parts = [cells[first : first + size] for first in range(0, len(cells), size)]
+        else:
+            parts = [[cell for cell in cells if cell[0] == seed] for seed in sorted({seed for seed, _ in lacking})]
+        for part in parts:
+            shown = tuple(cell for cell in part if (plan.name, *cell) in filmed)
+            jobs.append(Job(row, number, tuple(part), shown, not steady))
+    return jobs
+
+
+def run_job(context: Context, job: Job) -> dict[Key, Episode]:
+    """One piece of work, in whatever process; each episode is told when it has ended.
+
+    Returns:
+        The episodes that are to be filmed.
+    """
+    shared: Shared = context.shared
+    row, plan, routes = shared.rows[job.row], shared.plans[job.plan], shared.routes[job.plan]
+    clutter = CLUTTER[row.obstacles]
+    setups = [draw_setup(plan, routes[k], k, seed, clutter, shared.config) for seed, k in job.cells]
+    rows = [number for number, cell in enumerate(job.cells) if cell in job.filmed]
+    tell: Callable[[Episode], None] = lambda episode: context.tell(job.row, episode)  # noqa: E731
+    done = run_episodes(
+        plan,
+        setups,
+        row.locomotor,
+        row.navigator,
+        shared.config,
+        rows,
+        (lambda _: None) if job.at_once else tell,
+        context.is_stopped,
+    )
+    if job.at_once:
+        for episode in done:
+            tell(episode)
+    return {done[k].record.key: done[k] for k in rows}
