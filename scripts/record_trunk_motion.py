@@ -2,8 +2,7 @@
 
     python scripts/record_trunk_motion.py vinl/rough [--clutter none paper] [--robots 64] [--seconds 40] [--json FILE]
 
-Prints a table for each clutter preset, and a YAML snippet for configs/nav that covers them all. Takes about two minutes
-on two cores.
+Prints a table and the settings of configs/nav/motion for each clutter preset. Takes about two minutes on two cores.
 """
 
 from __future__ import annotations
@@ -37,38 +36,37 @@ def print_table(clutter: str, count: int, falls: int, sway: dict[str, Sway], exe
         print(f"| `{name}` | {value:.4f} |")
 
 
-def print_snippet(name: str, sway: list[dict[str, Sway]], execution: list[Execution]) -> None:
-    """Settings that cover all grounds: the largest motion and noise, the range of the gains."""
-    tilt = max(s[k].within for s in sway for k in ("roll", "pitch"))
-    offset = max(s[k].offset for s in sway for k in ("roll", "pitch"))
-    pitch = sum(s["pitch"].mean for s in sway) / len(sway)
-    height = sum(s["height"].mean for s in sway) / len(sway)
-    half = math.sqrt(3)  # half-width of a uniform distribution over its standard deviation
+def print_settings(name: str, clutter: str, sway: dict[str, Sway], execution: Execution) -> None:
+    """Settings for configs/nav/motion that say what was recorded on one ground.
 
-    def mean(key: str) -> float:
-        return sum(getattr(e, key) for e in execution) / len(execution)
+    Offsets of an episode are uniform there: their half-width is sqrt(3) standard deviations.
+    """
+    half = math.sqrt(3)
+
+    def pair(key: str, factor: float = 1.0) -> str:
+        return f"[{factor * getattr(sway['roll'], key):.4f}, {factor * getattr(sway['pitch'], key):.4f}]"
 
     def spread(key: str) -> str:
-        ends = [getattr(e, key) + sign * 2 * getattr(e, f"{key}_spread") for e in execution for sign in (-1, 1)]
-        return f"[{min(ends):.3f}, {max(ends):.3f}]"
+        mean, wide = getattr(execution, key), 2 * getattr(execution, f"{key}_spread")
+        return f"[{mean - wide:.3f}, {mean + wide:.3f}]"
 
-    print(f"\n# recorded from {name} by scripts/record_trunk_motion.py; radians, metres, seconds")
-    print("camera:")
-    print(f"  mount_height: {height:.3f} # the trunk walks at this height")
-    print(f"  # the trunk pitches by {math.degrees(pitch):+.2f} deg on average (nose down is positive)")
-    print("motion:")
-    print(f"  offset: {half * offset + abs(pitch):.4f}")
-    print(f"  shake: {tilt:.4f}")
-    print(f"  height_offset: {half * max(s['height'].offset for s in sway):.4f}")
-    print(f"  height_shake: {max(s['height'].within for s in sway):.4f}")
-    print("  with_trunk: true")
+    correlation = (sway["roll"].autocorrelation + sway["pitch"].autocorrelation) / 2
+    print(f"\n# recorded from {name}, clutter {clutter}, by scripts/record_trunk_motion.py; radians, metres, seconds")
+    print(f"camera:\n  mount_height: {sway['height'].mean:.3f}")
+    print("motion:  # pairs are roll and pitch")
+    print(f"  tilt: {pair('mean')}")
+    print(f"  offset: {pair('offset', half)}")
+    print(f"  shake: {pair('within')}")
+    print(f"  correlation: {correlation:.2f}")
+    print(f"  height_offset: {half * sway['height'].offset:.4f}")
+    print(f"  height_shake: {sway['height'].within:.4f}")
     print("execution:")
-    print(f"  lag: {mean('lag'):.3f}")
+    print(f"  lag: {execution.lag:.2f}")
     print(f"  speed_gain: {spread('speed_gain')}")
     print(f"  yaw_gain: {spread('yaw_gain')}")
     for key in ("speed_noise", "yaw_noise", "side_slip"):
-        print(f"  {key}: {max(getattr(e, key) for e in execution):.3f}")
-    print(f"  yaw_drift: {half * mean('yaw_drift') + abs(mean('yaw_bias')):.3f}")
+        print(f"  {key}: {getattr(execution, key):.4f}")
+    print(f"  yaw_drift: {half * execution.yaw_drift + abs(execution.yaw_bias):.4f}")
 
 
 def main() -> None:
@@ -83,20 +81,18 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="write the figures here as well")
     options = parser.parse_args()
     policy = load_policy(options.policy)
-    sways, executions, figures = [], [], {}
+    figures = {}
     for clutter in options.clutter:
         records = record_motion(policy, clutter, options.robots, options.seconds, options.seed, options.workers)
         sway, execution, falls = describe_sway(records), fit_execution(records), sum(r.fell for r in records)
         print_table(clutter, len(records), falls, sway, execution)
-        sways.append(sway)
-        executions.append(execution)
+        print_settings(policy.card.name, clutter, sway, execution)
         figures[clutter] = {
             "robots": len(records),
             "falls": falls,
             "trunk": {name: asdict(s) for name, s in sway.items()},
             "execution": asdict(execution),
         }
-    print_snippet(policy.card.name, sways, executions)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
 

@@ -1,6 +1,8 @@
 """The navigator alone: the same episodes for every policy, honest ends, figures and a page; bad options in one line."""
 
+import gzip
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
+from vinl.config.paths import assets_dir
 from vinl.evaluation.nav_report import aggregate_by_distance, choose_drawn
 from vinl.nav.config import NavConfig
 from vinl.nav.evaluation import (
@@ -17,12 +20,13 @@ from vinl.nav.evaluation import (
     build_homes,
     describe_episodes,
     evaluate_kind,
-    expand_plans,
     load_navigator,
     name_kind,
 )
+from vinl.nav.home_store import HomeStore
 from vinl.nav.training import build_actor, make_card
 from vinl.policies.io import save_policy
+from vinl.world.readers import expand_paths
 
 TINY = {"camera": {"width": 32, "height": 24, "mount_height": 0.3}, "network": {"vision": "cnn", "hidden": 8}}
 
@@ -91,10 +95,51 @@ def test_classes_of_distance_and_what_is_drawn():
     assert worst[0] == 1 and len(worst) == 6 and len(middle) == 3 and not set(worst) & set(middle)
 
 
-def test_slices_and_kinds_of_floor_plans():
-    assert expand_plans(["a.jsonl.gz:1:6:2", "b.yaml"]) == ["a.jsonl.gz:1", "a.jsonl.gz:3", "a.jsonl.gz:5", "b.yaml"]
-    with pytest.raises(InputError, match="names no plan"):
-        expand_plans(["a.jsonl:5:5"])
+def write_houses(path, count: int) -> str:
+    """A JSON lines file of one shipped home again and again; plan 1 is a house of one tiny room."""
+    home = json.loads((assets_dir() / "floorplans" / "harbour_flat.json").read_text())
+    corners = [[0, 0], [0.9, 0], [0.9, 0.9], [0, 0.9]]
+    sides = [{"from": a, "to": b, "thickness": 0.1} for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
+    tiny = {**home, "rooms": [{"name": "box", "outline": corners}], "walls": sides}
+    tiny |= {"doors": [], "windows": [], "furniture": []}
+    with gzip.open(path, "wt") as lines:
+        for k in range(count):
+            lines.write(json.dumps(tiny if k == 1 else home) + "\n")
+    return str(path)
+
+
+def test_ranges_of_plans_are_judged_and_what_is_none_is_counted(tmp_path, monkeypatch):
+    houses = write_houses(tmp_path / "houses.jsonl.gz", 5)
+    assert expand_paths([f"{houses}:1-3", "b.yaml"]) == [*(f"{houses}:{k}" for k in (1, 2, 3)), "b.yaml"]
+    assert expand_paths([f"{houses}:3-"]) == expand_paths([f"{houses}:3:5"]) == [f"{houses}:3", f"{houses}:4"]
+    assert expand_paths([f"{houses}:0-/2"]) == expand_paths([f"{houses}:0:5:2"])
+    for bad, words in (("3-2", "names no plan"), ("0-9", "holds 5 plans, 0 to 4"), ("5-", "names no plan")):
+        with pytest.raises(InputError, match=words):
+            expand_paths([f"{houses}:{bad}"])
+    with pytest.raises(InputError, match="no such file"):
+        expand_paths([f"{tmp_path}/none.jsonl:0-3"])
+    monkeypatch.setitem(sys.modules, "jinja2", None)  # figures do not wait for a page
+    out = tmp_path / "out"
+    options = ["--policy", "oracle", "--episodes", "6", "--steps", "3", "--out", str(out)]
+    assert main(["eval-nav", *options, "--floorplans", f"{houses}:1-2"]) == 0
+    data = json.loads((out / "results.json").read_text())
+    kind = data["kinds"]["houses"]
+    assert kind["homes"] == kind["dropped"] == 1 and len(kind["reasons"]) == 1
+    assert "houses.jsonl.gz:1: the plan is too small" in kind["reasons"][0]
+    assert not (out / "report.html").exists()
+
+
+def test_training_takes_ranges_and_drops_what_is_no_home(tmp_path):
+    houses = write_houses(tmp_path / "houses.jsonl.gz", 4)
+    few = {"count": 6, "workers": 0, "goals": 2, "starts": 32, "plans": [f"{houses}:0-1"], "plans_share": 1.0}
+    store = HomeStore.build(build_config(NavConfig, {"homes": few}))
+    assert {record.name for record in store.records} == {"harbour_flat"}
+    assert store.dropped == len(store.reasons) > 0
+    with pytest.raises(InputError, match="no such file"):
+        HomeStore.build(build_config(NavConfig, {"homes": {**few, "plans": ["nowhere.jsonl:0-1"]}}))
+
+
+def test_kinds_of_floor_plans():
     kinds = [name_kind(p) for p in ("harbour_flat", "x/houses.jsonl.gz:3", "m/lab.yaml", "p.png")]
     assert kinds == ["shipped", "houses", "ros_map", "picture"]
 

@@ -19,7 +19,8 @@ class Options:
     out: str
     """Folder for results.json and report.html."""
     floorplans: tuple[str, ...] = ()
-    """Floor plans beside the generated homes; FILE:FIRST:END:STEP is every STEP-th plan of a JSON lines file."""
+    """Floor plans beside the generated homes; FILE:50-99 are plans 50 to 99 of a JSON file, FILE:50- those from 50 on,
+    FILE:0-/2 every second."""
     homes: int | None = None
     """Generated homes; 200 by default, none where --floorplans is given."""
     homes_seed: int = 1_000_000_000
@@ -118,6 +119,7 @@ def main(argv: list[str]) -> int:
                 "distances": aggregate_by_distance(kind.records, END_REASONS),
                 "homes": len(kind.homes),
                 "dropped": kind.dropped,
+                "reasons": kind.reasons[:20],
                 "left_out": kind.left_out,
             }
             for kind in results
@@ -127,13 +129,21 @@ def main(argv: list[str]) -> int:
         "timing": {"wall_seconds": round(time.monotonic() - begun, 2)},
     }
     write_json(out / "results.json", data)
-    page = render_navigation_report(data, [(kind.records, kind.traces) for kind in results])
-    write_text(out / "report.html", page)
+    try:
+        page = render_navigation_report(data, [(kind.records, kind.traces) for kind in results])
+        write_text(out / "report.html", page)
+        where = f"report {out / 'report.html'}; figures {out / 'results.json'}"
+    except ModuleNotFoundError as error:
+        if error.name != "jinja2":
+            raise
+        where = f"figures {out / 'results.json'}; no report.html: jinja2 is not installed (pip install jinja2)"
     print_navigation_summary(console, data)
     for kind in results:
         if kind.dropped or kind.left_out:
             console.print(
                 f"{kind.kind}: {kind.dropped} homes without a way, {kind.left_out} robots without a start were left out"
             )
-    console.print(f"report {out / 'report.html'}; figures {out / 'results.json'}", soft_wrap=True)
+        for reason in kind.reasons[:3]:
+            console.print(f"  {reason}", soft_wrap=True)
+    console.print(where, soft_wrap=True)
     return 0

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import Any
 
-import jinja2
 import numpy as np
 from rich import box
 from rich.console import Console
@@ -92,7 +91,12 @@ def render_navigation_report(data: dict[str, Any], kinds: Sequence[tuple[Sequenc
     Args:
         data: what ``results.json`` holds.
         kinds: records and traces of each kind of home, in the order of ``data["kinds"]``.
+
+    Raises:
+        ModuleNotFoundError: jinja2 is not there.
     """
+    import jinja2  # figures without a page can be had without it
+
     parts = []
     for (name, kind), (records, traces) in zip(data["kinds"].items(), kinds, strict=True):
         worst, middle = choose_drawn(records)

@@ -37,7 +37,8 @@ class HomesConfig:
         count: homes at one time.
         seed: of the first home; with ``fresh`` above 0, later seeds follow.
         generator: what generated homes are like.
-        plans: floor-plan files or names to train in beside the generated homes, see ``vinl.world.readers``.
+        plans: floor-plan files or names to train in beside the generated homes, see ``vinl.world.readers``; a range
+            of a JSON file's plans as ``FILE:0-49``.
         plans_share: share of the homes that are made from ``plans``, each time with other goals and starts.
         goals: goals in each home, each with a distance field.
         starts: spots in each home that starts are drawn from.

@@ -22,7 +22,7 @@ from vinl.nav.measures import EpisodeEnd
 from vinl.policies.card import PolicyCard, observes_motion
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
-from vinl.world.readers import load_floorplan, shipped_floorplans
+from vinl.world.readers import expand_paths, shipped_floorplans
 
 MOTIONS = {
     "walking": "nav/motion/walking",
@@ -38,7 +38,6 @@ END_REASONS = ("success", "stuck", "looping", "timeout")
 """How an episode ends. ``stuck`` and ``looping`` are time-outs of which one knows more."""
 
 _CHECK_EVERY = 25
-_SLICE = re.compile(r"^(.+?):(\d+):(\d+)(?::(\d+))?$")
 
 
 @dataclass(frozen=True)
@@ -133,6 +132,7 @@ class KindResults:
         kind: of home.
         homes: their names.
         dropped: homes that no episode could be made in.
+        reasons: why not, of each.
         left_out: robots that no start within the range of distances was found for; they are in no figure.
         records, traces: one an episode.
     """
@@ -140,6 +140,7 @@ class KindResults:
     kind: str
     homes: list[str]
     dropped: int
+    reasons: list[str]
     left_out: int
     records: list[NavRecord]
     traces: list[NavTrace]
@@ -157,21 +158,6 @@ def load_navigator(name: str, device: str) -> DepthPolicy | None:
     if not isinstance(policy, DepthPolicy) or policy.card.kind != "navigation":
         raise InputError(f"--policy {name}: a {policy.card.kind} policy; give a navigator, or oracle")
     return policy
-
-
-def expand_plans(paths: Sequence[str]) -> list[str]:
-    """``houses.jsonl.gz:1:199:2`` is every second house from 1 to below 199; other paths stay."""
-    expanded: list[str] = []
-    for path in paths:
-        match = _SLICE.match(path)
-        if match and not Path(path).exists():
-            file, first, end, step = match.groups()
-            if int(step or 1) < 1 or int(end) <= int(first):
-                raise InputError(f"--floorplans {path}: FILE:FIRST:END:STEP names no plan")
-            expanded += [f"{file}:{k}" for k in range(int(first), int(end), int(step or 1))]
-        else:
-            expanded.append(path)
-    return expanded
 
 
 def name_kind(path: str) -> str:
@@ -233,9 +219,9 @@ def build_homes(
         config: of the environment.
         count: generated homes; 0: none.
         homes_seed: of the first one; training starts from seed 1, so choose one far above its number of homes.
-        plans: floor plans, see ``expand_plans``.
+        plans: floor plans, see ``vinl.world.readers.expand_paths``.
         device: for the homes.
-        progress: called with generated homes done and wanted.
+        progress: called with homes done and wanted, of each kind anew.
 
     Raises:
         InputError: there are no homes, or none of a kind can be used.
@@ -245,11 +231,11 @@ def build_homes(
         generated = replace(config, homes=replace(config.homes, count=count, seed=homes_seed))
         stores["generated"] = HomeStore.build(generated, device, progress)
     groups: dict[str, list[str]] = {}
-    for path in expand_plans(plans):
+    for path in expand_paths(plans):
         groups.setdefault(name_kind(path), []).append(path)
     for kind, paths in groups.items():
         own = replace(config, homes=replace(config.homes, seed=homes_seed))
-        stores[kind] = HomeStore.from_plans((load_floorplan(path) for path in paths), own, device)
+        stores[kind] = HomeStore.from_paths(paths, own, device, progress=progress)
     if not stores:
         raise InputError("there are no homes: give --homes N or --floorplans FILE")
     return stores
@@ -308,7 +294,7 @@ def evaluate_kind(
         began = {name: value.cpu().numpy() for name, value in begun.items()}
         ends = goals.cpu().numpy().astype(np.float64)
     results = KindResults(
-        kind, [r.name for r in homes.records], homes.dropped, int((began["unplaced"] > 0).sum()), [], []
+        kind, [r.name for r in homes.records], homes.dropped, homes.reasons, int((began["unplaced"] > 0).sum()), [], []
     )
     for k in range(n):
         if began["unplaced"][k] > 0:

@@ -81,14 +81,27 @@ def build_home(seed: int, config: NavConfig) -> BuiltHome | str:
     rng = np.random.default_rng([seed, 40493])
     homes = config.homes
     if homes.plans_share > 0 and rng.random() < homes.plans_share:
-        plan = _load_plan(homes.plans[rng.integers(len(homes.plans))])
-    else:
-        from vinl.world.homes import generate_home
+        paths = _expand(homes.plans)
+        return build_plan(paths[rng.integers(len(paths))], seed, config)
+    from vinl.world.homes import generate_home
 
-        try:
-            plan = generate_home(seed, homes.generator)
-        except InputError as error:
-            return str(error)
+    try:
+        plan = generate_home(seed, homes.generator)
+    except InputError as error:
+        return str(error)
+    return prepare_home(plan, seed, config)
+
+
+def build_plan(path: str, seed: int, config: NavConfig) -> BuiltHome | str:
+    """The home of a floor plan's file (one plan, not a range); the seed is that of goals, starts and clutter.
+
+    Returns:
+        The home, or why there is none: its file, or its floor, cannot be used.
+    """
+    try:
+        plan = _load_plan(path)
+    except InputError as error:
+        return str(error)
     return prepare_home(plan, seed, config)
 
 
@@ -97,6 +110,13 @@ def _load_plan(path: str) -> FloorPlan:
     from vinl.world.readers import load_floorplan  # pictures need libraries that generated homes do without
 
     return load_floorplan(path)
+
+
+@lru_cache(maxsize=4)
+def _expand(paths: tuple[str, ...]) -> list[str]:
+    from vinl.world.readers import expand_paths
+
+    return expand_paths(paths)
 
 
 def prepare_home(plan: FloorPlan, seed: int, config: NavConfig) -> BuiltHome | str:
@@ -184,11 +204,14 @@ def _draw_blocks(plan: FloorPlan, rng: np.random.Generator, clutter: ClutterConf
         return Blocks.empty()
     spots = np.argwhere(plan.free)
     wanted = round(rng.uniform(*clutter.density) * len(spots) * plan.frame.resolution**2)
-    placed = np.zeros((0, 2))
-    for xy in plan.frame.xy(spots[rng.integers(len(spots), size=2 * wanted)]):
-        if len(placed) < wanted and (np.hypot(*(placed - xy).T) >= clutter.spacing).all():
-            placed = np.vstack([placed, xy])
-    n = len(placed)
+    tried = plan.frame.xy(spots[rng.integers(len(spots), size=2 * wanted)])
+    apart = ((tried[:, None] - tried) ** 2).sum(-1) >= clutter.spacing**2
+    allowed, kept = np.ones(len(tried), bool), []
+    for k in range(len(tried)):
+        if allowed[k] and len(kept) < wanted:
+            kept.append(k)
+            allowed &= apart[k]
+    placed, n = tried[kept], len(kept)
     length, height = rng.uniform(*clutter.length, n), rng.uniform(*clutter.height, n)
     yaw = rng.uniform(-np.pi, np.pi, n)
     return Blocks(np.column_stack([placed, yaw, length, np.full(n, clutter.width), height]))

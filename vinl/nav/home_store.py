@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +14,11 @@ import warp as wp
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
 from vinl.nav.home_builder import BuiltHome, prepare_home
-from vinl.nav.home_stream import HomeStream, count_workers
+from vinl.nav.home_stream import HomeStream, build_plans, count_workers
 from vinl.nav.kernels import Homes
 from vinl.sensing.depth import check_device
 from vinl.world.floorplan import FloorPlan
+from vinl.world.readers import check_file, expand_paths
 
 _TRIES = 50
 """So many homes dropped for each one kept, and the configuration is refused."""
@@ -62,6 +63,7 @@ class HomeStore:
         homes: the grids on the device, for the kernels.
         device: torch device.
         dropped: homes without a path so far; they are never used.
+        reasons: why those were dropped that were there when the store was built.
         replaced: homes that took another's place so far.
         skipped: fresh homes that found no slot of their size.
 
@@ -78,6 +80,7 @@ class HomeStore:
         self._warp_device, self._tree = str(self.device), tree
         self.records = [_record(home) for home in built]
         self.dropped, self.replaced, self.skipped = dropped, 0, 0
+        self.reasons: list[str] = []
         self._capacity = np.array([home.cells for home in built])
         self._age = np.arange(len(built))
         self._mesh: list[wp.Mesh] = [self._build_mesh(home) for home in built]
@@ -128,6 +131,8 @@ class HomeStore:
             InputError: hardly any home has a path of the length asked for.
         """
         device = check_device(device)  # before minutes of building
+        for plan in expand_paths(config.homes.plans):
+            check_file(plan)
         wanted = config.homes.count
         workers = count_workers(config, wanted)
         stream = HomeStream(config, config.homes.seed, workers)
@@ -147,6 +152,7 @@ class HomeStore:
                 if progress is not None:
                     progress(len(built), wanted)
             store = cls(built, device, len(reasons), tree)
+            store.reasons = reasons
         except BaseException:
             stream.close()
             raise
@@ -171,18 +177,62 @@ class HomeStore:
         Raises:
             InputError: none of the plans can be used; the message says why not.
         """
+        homes = (
+            prepare_home(plan, config.homes.seed + k * copies + copy, config)
+            for k, plan in enumerate(plans)
+            for copy in range(copies)
+        )
+        return cls._of(homes, device)
+
+    @classmethod
+    def from_paths(
+        cls,
+        paths: Sequence[str],
+        config: NavConfig,
+        device: str | torch.device = "cpu",
+        copies: int = 1,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> HomeStore:
+        """Floor plans' files and ranges of plans in them, read and built by several processes where there are many.
+
+        A plan that cannot be used is dropped and counted; ``reasons`` says why.
+
+        Args:
+            paths: see ``vinl.world.readers.expand_paths``.
+            config: of the environment; its generator is not used.
+            device: for the homes.
+            copies: times that every plan is there, each with other goals.
+            progress: called with the plans read so far and how many there are.
+
+        Raises:
+            InputError: a file is missing, or none of the plans can be used; the message says why not.
+        """
+        plans = expand_paths(paths)
+        for plan in plans:
+            check_file(plan)
+
+        def count() -> Iterator[BuiltHome | str]:
+            for done, home in enumerate(build_plans(plans, config, copies), 1):
+                if progress is not None:
+                    progress(done, len(plans) * copies)
+                yield home
+
+        return cls._of(count(), device)
+
+    @classmethod
+    def _of(cls, homes: Iterable[BuiltHome | str], device: str | torch.device) -> HomeStore:
         built: list[BuiltHome] = []
         reasons: list[str] = []
-        for k, plan in enumerate(plans):
-            for copy in range(copies):
-                home = prepare_home(plan, config.homes.seed + k * copies + copy, config)
-                if isinstance(home, str):
-                    reasons.append(home)
-                else:
-                    built.append(home)
+        for home in homes:
+            if isinstance(home, str):
+                reasons.append(home)
+            else:
+                built.append(home)
         if not built:
             raise InputError("no floor plan can be used" + (f"; the last: {reasons[-1]}" if reasons else ""))
-        return cls(built, device, len(reasons))
+        store = cls(built, device, len(reasons))
+        store.reasons = reasons
+        return store
 
     def __len__(self) -> int:
         """How many homes there are."""

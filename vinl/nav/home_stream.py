@@ -5,11 +5,12 @@ from __future__ import annotations
 import multiprocessing
 import os
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from itertools import repeat
 
 from vinl.nav.config import NavConfig
-from vinl.nav.home_builder import BuiltHome, build_home
+from vinl.nav.home_builder import BuiltHome, build_home, build_plan
 
 _FEW = 24
 """So few homes are built sooner in place than processes start."""
@@ -69,6 +70,27 @@ class HomeStream:
         while len(self._waiting) < 4 * self.workers:
             self._waiting.append(self._pool.submit(build_home, self._seed, self.config))
             self._seed += 1
+
+
+def build_plans(paths: Sequence[str], config: NavConfig, copies: int = 1) -> Iterator[BuiltHome | str]:
+    """The homes of floor plans' files in their order, by several processes where there are many.
+
+    Args:
+        paths: each of one plan, see ``vinl.world.readers.expand_paths``.
+        config: of the environment.
+        copies: times that every plan is there, each with other goals.
+
+    Returns:
+        For each the home, or why there is none.
+    """
+    plans = [path for path in paths for _ in range(copies)]
+    seeds = range(config.homes.seed, config.homes.seed + len(plans))
+    workers = count_workers(config, len(plans))
+    if workers == 0:
+        yield from map(build_plan, plans, seeds, repeat(config))
+        return
+    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=_start_worker) as pool:
+        yield from pool.map(build_plan, plans, seeds, repeat(config), chunksize=4)
 
 
 def _start_worker() -> None:

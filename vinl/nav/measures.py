@@ -8,11 +8,10 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from vinl.world.endings import LOOPING_WAYS
+
 STUCK = 10
 """An episode that runs out of time after at least so many cancelled steps in a row counts as stuck."""
-
-_LOOPING = 3.0
-"""One that runs out of time, not stuck, after more than so many times the geodesic distance, counts as looping."""
 
 _NAMES = (
     "episodes",
@@ -83,7 +82,7 @@ def end_episodes(
     progress = (1.0 - end / start).clamp(0.0, 1.0)
     late = 1.0 - reached
     stuck = late * (in_a_row >= STUCK)
-    looping = late * (1.0 - stuck) * (path > _LOOPING * start)
+    looping = late * (1.0 - stuck) * (path > LOOPING_WAYS * start)
     return EpisodeEnd(
         counted=counted,
         home=home.clone(),

@@ -10,6 +10,7 @@ from vinl.config.paths import assets_dir
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers.image import read_image_plan
 from vinl.world.readers.json_plan import read_json_plan
+from vinl.world.readers.ranges import expand_paths
 from vinl.world.readers.ros_map import read_ros_map
 
 IMAGES = (".png", ".pgm")
@@ -17,7 +18,7 @@ ROS_MAPS = (".yaml", ".yml")
 JSONS = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
 MESHES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 
-__all__ = ["load_floorplan", "load_floorplans", "shipped_floorplans"]
+__all__ = ["check_file", "expand_paths", "load_floorplan", "load_floorplans", "shipped_floorplans"]
 
 
 def shipped_floorplans() -> list[str]:
@@ -59,13 +60,8 @@ def load_floorplan(
         raise InputError(f"--min-speck {min_speck}: give a number of pixels, 0 or more")
     if not 0.3 <= wall_height <= 20.0:
         raise InputError(f"wall height {wall_height:g} m: give metres between 0.3 and 20")
-    file, index = _split_index(text)
+    file, index = check_file(text)
     ending = file.name.lower()
-    if not file.exists():
-        known = ", ".join(shipped_floorplans())
-        raise InputError(f"{text}: no such file; give a path or one of the shipped plans: {known}")
-    if file.is_dir():
-        raise InputError(f"{text}: is a folder; give the files in it, for example {text}/map.yaml")
     if ending.endswith(JSONS):
         return read_json_plan(file, index, resolution, wall_height)
     if index is not None:
@@ -79,6 +75,24 @@ def load_floorplan(
 
         return read_mesh_plan(file, up, resolution, wall_height)
     raise InputError(f"{text}: unknown kind of floor plan; known are {', '.join(IMAGES + ROS_MAPS + JSONS + MESHES)}")
+
+
+def check_file(path: str | Path) -> tuple[Path, int | None]:
+    """The file of a floor plan, and the number of the plan in it.
+
+    Raises:
+        InputError: there is no such file.
+    """
+    text = str(path)
+    if text in shipped_floorplans():
+        return assets_dir() / "floorplans" / f"{text}.json", None
+    file, index = _split_index(text)
+    if not file.exists():
+        known = ", ".join(shipped_floorplans())
+        raise InputError(f"{text}: no such file; give a path or one of the shipped plans: {known}")
+    if file.is_dir():
+        raise InputError(f"{text}: is a folder; give the files in it, for example {text}/map.yaml")
+    return file, index
 
 
 def load_floorplans(

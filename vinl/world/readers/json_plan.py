@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import zlib
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,9 @@ from vinl.world.readers.own import SCHEMA, build_own_plan
 from vinl.world.readers.procthor import build_procthor_plan
 from vinl.world.readers.vectors import build_vector_plan, is_vector_plan
 from vinl.world.start_goal import check_way
+
+_SMALL = 20_000_000
+"""Files up to this size are read once [bytes]."""
 
 
 def read_json_plan(
@@ -70,6 +74,37 @@ def read_json_plan(
         raise InputError(f"{source}: the plan has a broken number ({error})") from None
 
 
+def count_plans(file: Path) -> int:
+    """How many plans a file holds.
+
+    Raises:
+        InputError: if it is broken, or no JSON.
+    """
+    name = file.name.lower()
+    packed = name.endswith(".gz")
+    if name.removesuffix(".gz").endswith(".jsonl"):
+        return len(_read_lines(file, packed))
+    if not name.removesuffix(".gz").endswith(".json"):
+        raise InputError(f"{file}: only JSON files hold several plans")
+    return _pick(file, packed, 0)[1]
+
+
+def _read_lines(file: Path, packed: bool) -> list[str]:
+    """Lines that are not empty; those of small files stay in memory, to be picked from."""
+    try:
+        status = file.stat()
+        read = _cache_lines if status.st_size < _SMALL else _cache_lines.__wrapped__
+        return read(file, packed, status.st_mtime_ns)
+    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
+        raise _explain(file, error) from None
+
+
+@lru_cache(maxsize=2)
+def _cache_lines(file: Path, packed: bool, written: int) -> list[str]:
+    with _open_text(file, packed) as lines:
+        return [line for line in lines if line.strip()]
+
+
 def _open_text(file: Path, packed: bool):
     return gzip.open(file, "rt", encoding="utf-8") if packed else file.open(encoding="utf-8")
 
@@ -92,21 +127,10 @@ def _parse(text: str, where: str) -> Any:
 
 
 def _pick_line(file: Path, packed: bool, index: int) -> tuple[Any, int | None]:
-    """One line of JSON lines and, if the file ended there, how many there are."""
-    _check_index(file, index, None)
-    count = 0
-    try:
-        with _open_text(file, packed) as lines:
-            for line in lines:
-                if not line.strip():
-                    continue
-                if count == index:
-                    return _parse(line, f"{file}:{index}"), None
-                count += 1
-    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
-        raise _explain(file, error) from None
-    _check_index(file, index, count)
-    raise AssertionError("the index was counted wrongly")
+    """One line of JSON lines, and how many there are."""
+    lines = _read_lines(file, packed)
+    _check_index(file, index, len(lines))
+    return _parse(lines[index], f"{file}:{index}"), len(lines)
 
 
 def _pick(file: Path, packed: bool, index: int) -> tuple[Any, int]:
