@@ -5,6 +5,7 @@ The names below are the public ones; each part is imported when its first name i
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -55,3 +56,7 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return __all__
+
+
+if "gymnasium" in sys.modules:  # its registry takes names alone: nothing else is imported
+    import_module("vinl.gym")

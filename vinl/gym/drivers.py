@@ -1,0 +1,86 @@
+"""The halves of the chain that are not the agent: legs under a navigator, or a navigator over legs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from vinl.config.errors import InputError
+from vinl.evaluation.batches import batch_navigator, batch_policy
+from vinl.evaluation.config import EvaluationConfig
+from vinl.evaluation.eyes import Eyes, open_eyes
+from vinl.evaluation.navigator import Navigator, check_choice, load_navigator
+from vinl.evaluation.senses import check_senses, give_senses
+from vinl.evaluation.walker import joint_targets
+from vinl.gym.trip import Trip
+from vinl.policies.io import list_policies, load_policy
+from vinl.policies.policy import Policy
+
+BEST_FIRST = ("loco", "teacher", "rough")
+"""Shipped locomotors, the one that is wanted most first."""
+
+
+def choose_locomotor(locomotor: str | Path | Policy | None) -> Policy:
+    """The policy itself, the one of that name, or the best shipped one.
+
+    Raises:
+        InputError: there is none, or it is no locomotor.
+    """
+    if locomotor is None:
+        shipped = list_policies()
+        locomotor = next((name for name in BEST_FIRST if name in shipped), None)
+        if locomotor is None:
+            raise InputError("no locomotor is shipped with this version; give a policy folder")
+    policy = load_policy(locomotor) if isinstance(locomotor, (str, Path)) else locomotor
+    check_senses(policy)
+    return policy
+
+
+class Legs:
+    """A locomotor that carries out velocities.
+
+    Attributes:
+        gains: kp [N m / rad] and kd [N m s / rad] that it was trained with.
+    """
+
+    def __init__(self, policy: Policy) -> None:
+        self._policy = batch_policy(policy)
+        self.gains = float(policy.card.action["kp"]), float(policy.card.action["kd"])
+
+    def enter(self, trip: Trip, ceiling: float | None) -> None:
+        """A new episode begins."""
+        self._policy.reset(1)
+        self._senses = give_senses(self._policy, trip.task.space.plan, [trip.setup.blocks], ceiling)
+        self._last = np.zeros((1, 12), np.float32)
+
+    def choose(self, trip: Trip, command: Float[np.ndarray, "1 3"]) -> Float[np.ndarray, "12"]:
+        """Joint targets [rad] of the next control step."""
+        self._last = self._senses.act(trip.qpos, trip.qvel, command, self._last, [0])
+        return joint_targets(self._last, self._policy.card)[0]
+
+
+class Guide:
+    """A navigator that chooses the velocities, see ``Navigator``."""
+
+    def __init__(self, navigator: str | Path | Navigator, rules: EvaluationConfig) -> None:
+        by_name = isinstance(navigator, (str, Path))
+        self._navigator = batch_navigator(load_navigator(navigator, rules) if by_name else navigator)
+        self._eyes: Eyes | None = None
+
+    def enter(self, trip: Trip, ceiling: float | None) -> None:
+        """A new episode begins."""
+        self._navigator.reset([trip.task])
+        self._last = np.zeros((1, 2))
+        camera = self._navigator.camera
+        plan, blocks = trip.task.space.plan, [trip.setup.blocks]
+        self._eyes = None if camera is None else open_eyes(plan, blocks, camera, ceiling)
+
+    def choose(self, trip: Trip) -> Float[np.ndarray, "2"]:
+        """Forward speed [m/s] and yaw rate [rad/s] of the next half second."""
+        seen = {"goal": trip.goal, "previous_action": self._last, "pose": trip.pose}
+        if self._eyes is not None:
+            seen["depth"] = self._eyes.look(trip.qpos, [0])
+        self._last = check_choice(self._navigator.act(seen), 1, self._navigator)
+        return self._last[0]
