@@ -61,6 +61,7 @@ def test_standing_robot_is_stuck(two_rooms: FloorPlan, standing: LocomotionPolic
         [two_rooms], standing, episodes=1, seeds=1, config=config, on_progress=lambda *x: told.append(x)
     ).records[0]
     assert (record.success, record.fell, record.end_reason) == (False, False, "stuck")
+    assert record.end_at == "free"
     assert record.time_s == pytest.approx(2.0)
     assert record.distance_m < 0.1
     assert (record.foot_steps, record.leg_contact_steps, record.paper_foot_steps) == (0, 0, 0)

@@ -70,4 +70,5 @@ def test_rates_are_ratios_of_episodes() -> None:
     assert figures["success"]["mean"] == pytest.approx(2 / 3, abs=1e-6)
     assert figures["falls"] == pytest.approx(1 / 3, abs=1e-6)
     assert (figures["episodes"], figures["episodes_in_rates"]) == (3, 2)
-    assert figures["end_reasons"] == {"success": 2, "fall": 1, "timeout": 0, "stuck": 0}
+    assert figures["end_reasons"] == {"success": 2, "fall": 1, "stuck": 0, "looping": 0, "timeout": 0}
+    assert figures["failures"]["fall"] == {"block": 0, "wall": 0, "free": 1}

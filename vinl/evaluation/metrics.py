@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from vinl.evaluation.records import END_REASONS, EpisodeRecord
+from vinl.evaluation.blame import count_failures
+from vinl.evaluation.records import EpisodeRecord
+from vinl.world.endings import END_REASONS
 
 BOOTSTRAP = 2000
 """Resamples of the bootstrap."""
@@ -106,4 +108,5 @@ def aggregate_episodes(records: Sequence[EpisodeRecord], min_metres: float = MIN
     figures["episodes"] = n
     figures["episodes_in_rates"] = len(walked)
     figures["end_reasons"] = {reason: sum(r.end_reason == reason for r in records) for reason in END_REASONS}
+    figures["failures"] = count_failures(records)
     return figures

@@ -10,12 +10,8 @@ from jaxtyping import Float
 
 from vinl.world.floorplan import FloorPlan
 
-SUCCESS, FALL, TIMEOUT, STUCK = "success", "fall", "timeout", "stuck"
 Key = tuple[str, int, int]
 """What tells an episode from all others of a row: name of the plan, seed, number of the start/goal pair."""
-
-END_REASONS = (SUCCESS, FALL, TIMEOUT, STUCK)
-"""How an episode ends. ``stuck`` is a time-out of a robot that no longer got anywhere."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +27,7 @@ class EpisodeRecord:
         straight_m, geodesic_m: straight and shortest distance from start to goal [m].
         blocks: how many blocks lay in the plan.
         success: came within the success radius.
-        end_reason: one of ``END_REASONS``.
+        end_reason: one of ``endings.END_REASONS``.
         fell: ended in a fall.
         time_s: length [s].
         distance_m: way of the trunk, summed at 50 Hz [m].
@@ -44,6 +40,7 @@ class EpisodeRecord:
         paper_foot_steps: the paper's own rule, from foot height and force [ViNL code].
         speed_rmse: root mean square of the error of the horizontal velocity [m/s].
         yaw_rate_rmse: the same of the yaw rate [rad/s].
+        end_at: ``block``, ``wall`` or ``free``: what a robot fell over, or was stuck at; empty for other ends.
         note: why start and goal are nearer than asked for, if they are.
     """
 
@@ -71,6 +68,7 @@ class EpisodeRecord:
     paper_foot_steps: int
     speed_rmse: float
     yaw_rate_rmse: float
+    end_at: str = ""
     note: str = ""
 
     @property

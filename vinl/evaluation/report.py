@@ -8,6 +8,7 @@ from typing import Any
 
 import jinja2
 
+from vinl.evaluation.blame import FAILURES, read_failure
 from vinl.evaluation.describe import describe_environment
 from vinl.evaluation.drawing import draw_histogram, draw_map
 from vinl.evaluation.metrics import aggregate_episodes
@@ -66,9 +67,11 @@ def render_report(results: Results, command: str) -> str:
         loader=jinja2.PackageLoader("vinl.evaluation"), autoescape=True, undefined=jinja2.StrictUndefined
     )
     environment.filters["figure"] = format_figure
+    environment.filters["failure"] = read_failure
     return environment.get_template("report.html.j2").render(
         aggregate=results.aggregate,
         plans=plans,
+        kinds=FAILURES,
         failures=[row for row in rows if not row.record.success],
         histograms=histograms,
         paper=PAPER_ROWS,

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
+from vinl.evaluation.blame import FALL_WINDOW, find_cause
 from vinl.evaluation.config import EvaluationConfig
 from vinl.evaluation.episodes import EpisodeSetup
 from vinl.evaluation.metrics import weigh_path, weigh_progress
-from vinl.evaluation.records import FALL, STUCK, SUCCESS, TIMEOUT, Episode, EpisodeRecord, EpisodeTrace
+from vinl.evaluation.records import Episode, EpisodeRecord, EpisodeTrace
 from vinl.evaluation.walker import Walker
 from vinl.robot.aliengo import CONTROL_DT
+from vinl.world.endings import FALL, STUCK, SUCCESS, name_late_end
 from vinl.world.free_space import FreeSpace
 from vinl.world.geodesic import distance_field, read_field
 
@@ -65,17 +67,19 @@ class Tally:
         self._end = reason
 
     def end_of_time(self) -> None:
-        """The episode is over: a time-out, or the robot was stuck."""
+        """The episode is over: it ran out of time."""
         back = int(self._config.stuck_window / (PATH_EVERY * CONTROL_DT))
         long_enough = len(self._path) > back
         moved = np.linalg.norm(self._at - self._path[-1 - back]) if long_enough else np.inf
-        self.end(STUCK if moved < self._config.stuck_distance else TIMEOUT)
+        stuck = bool(moved < self._config.stuck_distance)
+        self.end(name_late_end(stuck, self._distance, self._setup.route.geodesic_m))
 
     def close(self) -> Episode:
         """Record and trace of the episode."""
         setup, route, counts = self._setup, self._setup.route, self._counts
         success, rmse = self._end == SUCCESS, np.sqrt(self._errors / max(self._steps, 1))
         left = 0.0 if success else self._left()
+        contacts = np.array(self._contacts, np.float64).reshape(-1, 4)
         record = EpisodeRecord(
             plan=setup.plan,
             episode=setup.episode,
@@ -101,16 +105,25 @@ class Tally:
             paper_foot_steps=counts["paper"],
             speed_rmse=float(rmse[0]),
             yaw_rate_rmse=float(rmse[1]),
+            end_at=self._blame(contacts),
             note=route.note,
         )
         trace = EpisodeTrace(
             path=np.round(np.array([*self._path, self._at]), 3),
-            contacts=np.round(np.array(self._contacts, np.float64).reshape(-1, 4), 3),
+            contacts=np.round(contacts, 3),
             blocks=setup.blocks.rows,
             poses=np.array(self._poses, np.float64).reshape(-1, 19),
             commands=np.array(self._commands, np.float64).reshape(-1, 3),
         )
         return Episode(record, trace)
+
+    def _blame(self, contacts: Float[np.ndarray, "m 4"]) -> str:
+        """What a robot fell over, or was stuck at."""
+        window = {FALL: FALL_WINDOW, STUCK: self._config.stuck_window}.get(self._end)
+        if window is None:
+            return ""
+        since = self._steps * CONTROL_DT - window
+        return find_cause(self._at, contacts, since, self._space, self._setup.blocks)
 
     def _left(self) -> float:
         """Shortest distance to the goal from where the episode ended [m]; zero would be a success."""
