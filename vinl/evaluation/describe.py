@@ -40,7 +40,9 @@ def describe_navigator(navigator: Navigator) -> dict[str, Any]:
     """Which navigator it was: the policy, or the name alone."""
     if isinstance(navigator, LearnedNavigator):
         return describe_policy(navigator.policy)
-    return {"name": ORACLE if isinstance(navigator, OracleNavigator) else type(navigator).__name__}
+    if isinstance(navigator, OracleNavigator):
+        return {"name": ORACLE}
+    return {"name": getattr(navigator, "name", type(navigator).__name__)}
 
 
 def describe_plan(plan: FloorPlan) -> dict[str, Any]:

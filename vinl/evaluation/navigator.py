@@ -93,7 +93,7 @@ def check_choice(choice: Any, n: int, navigator: Navigator) -> Float[np.ndarray,
         InputError: another shape than (n, 2), or numbers that are not finite.
     """
     found = np.asarray(choice, dtype=np.float64)
-    name = type(navigator).__name__
+    name = getattr(navigator, "name", type(navigator).__name__)
     if found.shape != (n, 2):
         raise InputError(f"navigator {name} must return speeds and yaw rates of shape ({n}, 2), got {found.shape}")
     if not np.isfinite(found).all():
