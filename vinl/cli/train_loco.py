@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -50,7 +51,7 @@ STAGES = {1: "loco/rough", 2: "loco/teacher", 3: "loco/student"}
 
 
 def main(argv: list[str]) -> int:
-    """Run the command; returns 130 after an interrupt."""
+    """Run the command; returns 130 after an interrupt, 1 where numbers were not finite."""
     options = parse_options(Options, argv, "train-loco")
     if options.stage not in STAGES:
         raise InputError(f"--stage {options.stage} does not exist; choose {', '.join(map(str, STAGES))}")
@@ -73,6 +74,7 @@ def main(argv: list[str]) -> int:
     from vinl.config.loader import load_config
     from vinl.loco.config import LocoConfig
     from vinl.loco.training import train_locomotor
+    from vinl.rl.not_finite import NotFiniteError
 
     if options.resume:
         folder, config = options.resume, None
@@ -88,7 +90,11 @@ def main(argv: list[str]) -> int:
         folder = options.out or f"runs/{source.removesuffix('.yaml').split('/')[-1]}"
     if options.iterations is not None and options.iterations < 1:
         raise InputError(f"--iterations must be at least 1, got {options.iterations}")
-    complete = train_locomotor(config, folder, device, save_every=options.save_every, iterations=options.iterations)
+    try:
+        complete = train_locomotor(config, folder, device, save_every=options.save_every, iterations=options.iterations)
+    except NotFiniteError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
     if complete:
         print(f"trained: {folder}/policy  (try: vinl eval --loco {folder})")
         return 0

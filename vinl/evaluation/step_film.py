@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import imageio_ffmpeg
 import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageDraw, ImageFont
 
+from vinl.evaluation.film_file import write_film
 from vinl.evaluation.step import ACROSS, DEPTH, Crossing
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.sensing.raytrace import RayRenderer, look_at
@@ -38,33 +38,8 @@ def film_steps(ways: Mapping[str, list[Crossing]], height: float, path: Path) ->
         height: of the block [m].
         path: ``.mp4`` or ``.gif``; a GIF has half the pictures.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    scratch = path.with_name(f".{path.name}")
-    rate = round(1 / CONTROL_DT / SLOWER)
-    try:
-        if path.suffix == ".gif":
-            pictures = [Image.fromarray(frame) for frame in draw_steps_frames(ways, height, _GIF_EVERY)]
-            pictures = [picture.quantize(128) for picture in pictures]
-            pause = round(1000 * _GIF_EVERY / rate)
-            pictures[0].save(scratch, "GIF", save_all=True, append_images=pictures[1:], duration=pause, loop=0)
-        else:
-            size = (SIZE[0], SIZE[1] * len(ways))
-            writer = imageio_ffmpeg.write_frames(
-                str(scratch),
-                size,
-                fps=rate,
-                quality=6,
-                ffmpeg_log_level="error",  # type: ignore[arg-type]
-            )
-            writer.send(None)
-            try:
-                for frame in draw_steps_frames(ways, height):
-                    writer.send(np.ascontiguousarray(frame))
-            finally:
-                writer.close()
-        scratch.replace(path)
-    finally:
-        scratch.unlink(missing_ok=True)
+    every = _GIF_EVERY if path.suffix == ".gif" else 1
+    write_film(draw_steps_frames(ways, height, every), path, round(1 / CONTROL_DT / SLOWER) / every)
 
 
 def draw_steps_frames(

@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float, Int, UInt8
 from vinl.loco.commands import DRAWS, between, draw_commands
 from vinl.loco.config import LocoConfig, RewardConfig
 from vinl.loco.curriculum import next_levels
+from vinl.loco.lost import KEPT, REASONS, Lost, keep_lost
 from vinl.loco.rewards import Motion, reward_terms
 from vinl.loco.simulation import Body, Contacts, Ground, Simulation
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
@@ -25,8 +26,8 @@ from vinl.world.terrain import build_terrain
 _EDGE = 2.0
 """An episode ends as by time this near to the edge of the terrain [m]."""
 
-_MAX_SPEED = 150.0
-"""A joint faster than this [rad/s] means that the physics blew up."""
+MAX_SPEED = 150.0
+"""A speed beyond this [m/s, rad/s] means that the physics blew up."""
 
 _UPSIDE = -0.3
 """Third component of the gravity vector in the trunk above which the robot has fallen: tilted by more than 72 deg."""
@@ -67,7 +68,8 @@ class State(NamedTuple):
         action: (n, 12) last one.
         command: (n, 3); command_left: (n,) steps until the next.
         push_left: (n,) steps until the next push.
-        step: (n,) of the episode, from a random one at first; life: (n,) steps since the start.
+        step: (n,) of the episode, from a random one at first; life: (n,) steps since the start, -1 where the
+            observation is not finite.
         air_time: (n, 4) [s]; touched: (n, 4) feet on the ground in the last step.
         way, commanded: (n,) progress along the commands and what they asked for [m].
         hits: (n,) steps of the episode with a foot or shank on a block.
@@ -137,10 +139,11 @@ class LocoEnvironment:
         frame = self.simulation.frame
         self._edge = np.array([-frame.x0, -frame.y0]) - _EDGE
         self.set_rewards(config.rewards)
-        self._step = jax.jit(self._advance, donate_argnums=(1,))
+        self._step = jax.jit(self._advance, donate_argnums=(1, 2))
         self._look = jax.jit(self._observations)
         key = jax.random.PRNGKey(config.seed if seed is None else seed)
         self.state: State = jax.device_put(jax.jit(self._first_state)(key), device)
+        self._lost: Lost = jax.device_put(Lost.none(), device)
 
     def set_rewards(self, rewards: RewardConfig) -> None:
         """Weights and widths from the next step on; a training may move them without compiling anew."""
@@ -158,7 +161,9 @@ class LocoEnvironment:
 
     def step(self, action: Float[Array, "n 12"]) -> StepResult:
         """One control step; robots whose episode ends start anew at once. The old state is given up."""
-        self.state, result = self._step(self.simulation.ground, self.state, action, self._rewards)
+        self.state, self._lost, result = self._step(
+            self.simulation.ground, self.state, self._lost, action, self._rewards
+        )
         return result
 
     def read_measures(self) -> dict[str, float]:
@@ -186,6 +191,21 @@ class LocoEnvironment:
             "not_finite": raw["not_finite"],
             **{name: value / steps / CONTROL_DT for name, value in raw.items() if name.startswith("reward/")},
         }
+
+    def take_lost(self) -> list[dict[str, Any]]:
+        """The states before the steps that went wrong since the last call, of at most ``lost.KEPT`` robots: the fields
+        of ``Lost`` by name, with the reason in words. Waits for the device: call it when ``not_finite`` says so."""
+        lost = {name: np.asarray(column) for name, column in self._lost._asdict().items()}
+        self._lost = jax.device_put(Lost.none(), jax.devices()[0])
+        total, seed = int(lost.pop("total")), self.config.seed
+        return [
+            {
+                **{name: column[k] for name, column in lost.items()},
+                "reason": REASONS[int(lost["reason"][k])],
+                "seed": seed,
+            }
+            for k in range(min(total, KEPT))
+        ]
 
     # ---- starts ---------------------------------------------------------------------------------------------------
 
@@ -245,24 +265,34 @@ class LocoEnvironment:
         return exact + self.config.randomisation.observation_noise * jnp.asarray(NOISE) * (2 * noise - 1), exact
 
     def _advance(
-        self, ground: Ground, old: State, action: Float[Array, "n 12"], rewards: dict[str, Any]
-    ) -> tuple[State, StepResult]:
+        self, ground: Ground, old: State, lost: Lost, given: Float[Array, "n 12"], rewards: dict[str, Any]
+    ) -> tuple[State, Lost, StepResult]:
         c, n = self.config, self.num_envs
         key, draw = jax.random.split(old.key)
         u = jax.random.uniform(draw, (n, 40))
-        action = jnp.clip(jnp.nan_to_num(action), -CLIP, CLIP)
+        action = jnp.clip(jnp.nan_to_num(given), -CLIP, CLIP)
         target = jnp.asarray(DEFAULT_POSE, jnp.float32) + ACTION_SCALE * action
         body, contacts, torque = self.simulation.step(ground, old.body, target, old.friction, old.added_mass)
 
-        # physics that blew up counts as a fall and never reaches the learner
-        sane = jnp.isfinite(body.qpos.sum(1) + body.qvel.sum(1) + body.warmstart.sum(1) + torque.sum(1))
-        broken = ~sane | (jnp.abs(body.qvel).max(1) > _MAX_SPEED)
+        # what is not finite counts as a fall and never reaches the learner
+        wrong = {
+            "physics": ~jnp.isfinite(body.qpos.sum(1) + body.qvel.sum(1) + body.warmstart.sum(1) + torque.sum(1)),
+            "speed": jnp.abs(body.qvel).max(1) > MAX_SPEED,
+            "action": ~jnp.isfinite(given).all(1),
+            "observation": old.life < 0,  # noted at the end of the last step
+        }
+        broken = jnp.any(jnp.stack(list(wrong.values())), 0)
         body = Body(*(jnp.where(broken[:, None], last, now) for now, last in zip(body, old.body, strict=True)))
         torque = jnp.where(broken[:, None], 0.0, torque)
 
         motion, touching = self._motion(old, body, contacts, torque, action, broken)
         terms = reward_terms(motion, rewards["sigma"])
-        weighted = {name: jnp.nan_to_num(terms[name]) * (rewards[name] * CONTROL_DT) for name in TERMS}
+        weighted = {name: terms[name] * (rewards[name] * CONTROL_DT) for name in TERMS}
+        wrong["reward"] = ~jnp.isfinite(jnp.sum(jnp.stack(list(weighted.values())), 0))
+        broken, motion = broken | wrong["reward"], motion._replace(fallen=motion.fallen | wrong["reward"])
+        weighted = {name: jnp.where(wrong["reward"], 0.0, value) for name, value in weighted.items()}
+        weighted["fall"] = motion.fallen * rewards["fall"]
+        lost = keep_lost(lost, jnp.stack([wrong[name] for name in REASONS]), old, given)
         total = jnp.sum(jnp.stack([value for name, value in weighted.items() if name != "fall"]), 0)
         floor = rewards["floor"] * CONTROL_DT
         clipped = total < floor
@@ -286,7 +316,7 @@ class LocoEnvironment:
             motion.fallen,
             way,
             commanded,
-            life / self.episode_steps,
+            jnp.maximum(life, 1) / self.episode_steps,
             u[:, 35],
             hits,
         )
@@ -327,8 +357,11 @@ class LocoEnvironment:
         )
         state = _strong(state)
         noisy, exact = self._observations(ground, state)
+        blind = ~jnp.isfinite(exact.sum(1))
+        noisy, exact = (jnp.where(blind[:, None], 0.0, x) for x in (noisy, exact))
+        state = state._replace(life=jnp.where(blind, -1, state.life))  # the next step sets the robot back
         ends = done.astype(jnp.uint8), timeout.astype(jnp.uint8)
-        return state, StepResult(noisy, exact, reward, *ends, state.body.qpos[:, :7])
+        return state, lost, StepResult(noisy, exact, reward, *ends, state.body.qpos[:, :7])
 
     def _motion(
         self, old: State, body: Body, contacts: Contacts, torque: Array, action: Array, broken: Array

@@ -201,18 +201,26 @@ class Simulation:
         )
         return Body(qpos, qvel, warm), contacts, torque
 
-    def _control_step(self, ground, qpos, qvel, warm, target, friction, added_mass):
-        """The substeps of one robot."""
+    def robot_model(self, ground: Ground, friction: Array, added_mass: Array) -> mjx.Model:
+        """The model of one robot: its ground, the friction of its feet, the mass added to its trunk [kg]."""
         mx = self._mx
-        model = mx.replace(
+        return mx.replace(
             hfield_data=ground.normalised,
             geom_friction=mx.geom_friction.at[self._feet, 0].set(friction),
             body_mass=mx.body_mass.at[self._trunk].add(added_mass),
         )
 
+    def physics_step(self, model: mjx.Model, qpos: Array, qvel: Array, warm: Array, target: Array) -> mjx.Data:
+        """5 ms of one robot: (19,), (18,), (18,) of its state and (12,) joint targets [rad]."""
+        return mjx.step(model, self._start.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warm, ctrl=target))
+
+    def _control_step(self, ground, qpos, qvel, warm, target, friction, added_mass):
+        """The substeps of one robot."""
+        model = self.robot_model(ground, friction, added_mass)
+
         def substep(carry, _):
             qpos, qvel, warm, flags, _ = carry
-            data = mjx.step(model, self._start.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warm, ctrl=target))
+            data = self.physics_step(model, qpos, qvel, warm, target)
             contact = data._impl.contact
             on = contact.dist[self._contact_rows] < 0
             up, z = contact.frame[:, 0, 2][self._contact_rows], contact.pos[:, 2][self._contact_rows]

@@ -61,6 +61,10 @@ class LocoVecEnv(VecEnv):
         """Means since the last call."""
         return self.environment.read_measures()
 
+    def take_lost(self) -> list[dict[str, Any]]:
+        """States before the steps that went wrong, see ``LocoEnvironment.take_lost``."""
+        return self.environment.take_lost()
+
     def save_state(self) -> dict[str, Any]:
         """The whole state of all robots, levels and random numbers included."""
         leaves = [np.asarray(x) for x in jax.tree.leaves(self.environment.state)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -13,6 +14,7 @@ import torch
 from torch.utils.tensorboard import SummaryWriter
 
 from vinl.config.errors import InputError
+from vinl.rl.not_finite import NotFiniteError, is_finite, judge_losses
 from vinl.rl.progress import TrainingProgress
 from vinl.rl.run_folder import RunFolder
 from vinl.rl.stopwatch import Stopwatch
@@ -172,20 +174,25 @@ class TrainingLoop:
 
         Returns:
             Whether all iterations are done.
+
+        Raises:
+            NotFiniteError: more than one robot step in a thousand of an iteration was not finite. The checkpoint is
+                written before, unless the policy itself is not finite.
         """
-        steps = self.steps
+        steps, wrong, sound = self.steps, None, True
         first = self.current_learning_iteration
         writer = SummaryWriter(str(self.folder.path / "tensorboard"), purge_step=first)
         observation = self.env.get_observations().to(self.device)
         self.alg.train_mode()
         saved = time.monotonic()
         with TrainingProgress(iterations, first) as progress, self._interruptible(progress):
-            while self.current_learning_iteration < iterations and not self._stop:
+            while self.current_learning_iteration < iterations and not self._stop and wrong is None:
                 start = time.perf_counter()
                 self.schedule(self.alg, self.current_learning_iteration / iterations)
                 observation = self._roll_out(observation)
                 collected = time.perf_counter()
-                losses = self.alg.update()
+                losses = self._learn()
+                sound = all(map(math.isfinite, losses.values()))
                 self.current_learning_iteration += 1
                 self.samples += steps * self.env.num_envs
                 measures = self.env.read_measures()
@@ -198,7 +205,7 @@ class TrainingLoop:
                     "seconds": end - start,
                     "learning_rate": self.alg.learning_rate,
                     **self.describe_policy(),
-                    **{f"loss/{name}": float(value) for name, value in losses.items()},
+                    **{f"loss/{name}": value for name, value in losses.items()},
                     **measures,
                     **({f"seconds/{k}": v for k, v in self._stopwatch.read().items()} if self._stopwatch else {}),
                 }
@@ -208,11 +215,17 @@ class TrainingLoop:
                 for name, value in row.items():
                     writer.add_scalar(name if "/" in name else f"train/{name}", value, self.current_learning_iteration)
                 progress.show(self.current_learning_iteration, self.figures(row))
-                if time.monotonic() - saved > self.save_every:
+                count = self.current_learning_iteration
+                wrong = judge_losses(self.env, measures, steps * self.env.num_envs, count, self.folder)
+                if wrong is None and sound and time.monotonic() - saved > self.save_every:
                     self.checkpoint()
                     saved = time.monotonic()
-            self.checkpoint()
+            kept = (wrong is None and sound) or is_finite(self.alg.get_policy())
+            if kept:
+                self.checkpoint()
         writer.close()
+        if wrong is not None:
+            raise NotFiniteError(wrong if kept else f"{wrong}; the policy is not finite either: the checkpoint is old")
         return self.current_learning_iteration >= iterations
 
     def _roll_out(self, observation: Any) -> Any:
@@ -223,6 +236,17 @@ class TrainingLoop:
                 self.alg.process_env_step(observation, rewards, dones, extras)
             self.alg.compute_returns(observation)
         return observation
+
+    def _learn(self) -> dict[str, float]:
+        """The losses of an update. One that breaks down over numbers that are not finite says so."""
+        try:
+            return {name: float(value) for name, value in self.alg.update().items()}
+        except (RuntimeError, ValueError) as error:
+            measures, robot_steps = self.env.read_measures(), self.steps * self.env.num_envs
+            wrong = judge_losses(self.env, measures, robot_steps, self.current_learning_iteration + 1, self.folder)
+            if wrong is None:
+                raise
+            raise NotFiniteError(f"{wrong}; the policy is not finite either: the checkpoint is old") from error
 
     @contextlib.contextmanager
     def _interruptible(self, progress: TrainingProgress) -> Iterator[None]:

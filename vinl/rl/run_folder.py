@@ -8,6 +8,7 @@ import pickle
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 import yaml
 
@@ -17,6 +18,11 @@ CONFIG = "config.yaml"
 METRICS = "metrics.jsonl"
 CHECKPOINT = "checkpoint.pt"
 ORIGIN = "origin.json"
+LOST = "not_finite"
+"""Folder of the states of robots whose numbers went wrong."""
+
+MAX_LOST = 20
+"""How many of them a run keeps: the first ones."""
 
 
 class RunFolder:
@@ -108,6 +114,28 @@ class RunFolder:
         except (RuntimeError, OSError, EOFError, pickle.UnpicklingError, ValueError) as error:
             first = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise InputError(f"{file} is broken ({first}); remove it to start the run anew") from None
+
+    def save_lost(self, state: dict[str, Any]) -> Path | None:
+        """Save the state of a robot whose numbers went wrong, with the run's configuration; ``vinl play`` reads it.
+
+        Args:
+            state: numbers, arrays and text by name.
+
+        Returns:
+            The file ``not_finite/NUMBER.npz``; None: the run keeps ``MAX_LOST`` of them already.
+        """
+        folder = self.path / LOST
+        folder.mkdir(parents=True, exist_ok=True)
+        number = len(list(folder.glob("*.npz"))) + 1
+        if number > MAX_LOST:
+            return None
+        file = folder / f"{number:06d}.npz"
+        scratch = file.with_suffix(".new")
+        config = self.path / CONFIG
+        with scratch.open("wb") as stream:
+            np.savez(stream, config=config.read_text(encoding="utf-8") if config.is_file() else "", **state)
+        scratch.replace(file)
+        return file
 
     def append_metrics(self, row: dict[str, float]) -> None:
         """Add a line to the curves."""

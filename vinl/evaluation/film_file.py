@@ -1,0 +1,48 @@
+"""Pictures to a film on disk, whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+from jaxtyping import UInt8
+from PIL import Image
+
+
+def write_film(frames: Iterable[UInt8[np.ndarray, "height width 3"]], path: Path, rate: float) -> None:
+    """Write a film.
+
+    Args:
+        frames: pictures, all of one size; width and height are multiples of 16.
+        path: ``.mp4`` or ``.gif``.
+        rate: pictures a second.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    scratch, writer = path.with_name(f".{path.name}"), None
+    try:
+        if path.suffix == ".gif":
+            pictures = [Image.fromarray(frame).quantize(128) for frame in frames]
+            pause = round(1000 / rate)
+            pictures[0].save(scratch, "GIF", save_all=True, append_images=pictures[1:], duration=pause, loop=0)
+        else:
+            for frame in frames:
+                if writer is None:
+                    size = (frame.shape[1], frame.shape[0])
+                    writer = imageio_ffmpeg.write_frames(
+                        str(scratch),
+                        size,
+                        fps=rate,  # type: ignore[arg-type]
+                        quality=6,
+                        ffmpeg_log_level="error",
+                    )
+                    writer.send(None)
+                writer.send(np.ascontiguousarray(frame))
+            if writer is not None:
+                writer.close()
+        scratch.replace(path)
+    finally:
+        if writer is not None:
+            writer.close()
+        scratch.unlink(missing_ok=True)

@@ -1,0 +1,69 @@
+"""What a training does when numbers are not finite: a few robots are saved and forgotten, many end it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Protocol, runtime_checkable
+
+import torch
+
+from vinl.rl.run_folder import LOST, RunFolder
+
+MAX_SHARE = 1e-3
+"""More than this share of an iteration's robot steps ends the training; a single one never does."""
+
+
+class NotFiniteError(Exception):
+    """A training cannot go on; the message is one line."""
+
+
+@runtime_checkable
+class LosingEnv(Protocol):
+    """An environment that keeps the states before the steps that went wrong."""
+
+    def take_lost(self) -> list[dict[str, Any]]:
+        """Those since the last call."""
+        ...
+
+
+def judge_losses(
+    env: Any, measures: Mapping[str, float], robot_steps: int, iteration: int, folder: RunFolder
+) -> str | None:
+    """Save the robots whose numbers went wrong in an iteration.
+
+    Args:
+        env: asked for their states where ``measures`` has ``not_finite`` above zero; else nothing waits for the device.
+        measures: of the iteration.
+        robot_steps: of the iteration.
+        iteration: its number.
+        folder: the states go into its folder ``not_finite``.
+
+    Returns:
+        Why the training must end, in one line; None: it goes on.
+    """
+    count = measures.get("not_finite", 0.0)
+    if not count:
+        return None
+    reasons: dict[str, int] = {}
+    if isinstance(env, LosingEnv):
+        for state in env.take_lost():
+            folder.save_lost({**state, "iteration": iteration})
+            reasons[state["reason"]] = reasons.get(state["reason"], 0) + 1
+    if count <= max(1.0, MAX_SHARE * robot_steps):
+        return None
+    causes = f" ({', '.join(sorted(reasons, key=lambda name: -reasons[name]))})" if reasons else ""
+    where = folder.path / LOST
+    return (
+        f"{count:.0f} of {robot_steps} robot steps in iteration {iteration} were not finite{causes}, more than one in "
+        f"a thousand; look at one of them with  vinl play --state {where}/{FIRST}"
+    )
+
+
+FIRST = "000001.npz"
+"""The first state of a run."""
+
+
+def is_finite(module: torch.nn.Module) -> bool:
+    """Whether all weights of a network are finite. Waits for the device."""
+    return all(math.isfinite(float(weight.detach().float().sum())) for weight in module.parameters())
