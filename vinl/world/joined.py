@@ -1,4 +1,4 @@
-"""Blocks that lie against others: end to end, at an angle, or side by side."""
+"""Blocks that lie against others: end to end, at an angle, side by side, or in long rows."""
 
 from __future__ import annotations
 
@@ -36,6 +36,25 @@ def join_blocks(rng: np.random.Generator, blocks: Blocks, share: float) -> Block
     beside = _turn(np.column_stack([np.zeros(n), width * side]), yaw)
     centre = np.column_stack([x, y]) + np.where((way == 2)[:, None], beside, end + beyond)
     return Blocks(np.column_stack([centre, turned, own[0], width, own[1]]))
+
+
+def draw_rows(
+    rng: np.random.Generator,
+    centres: Float[np.ndarray, "n 2"],
+    length: tuple[float, float],
+    height: tuple[float, float],
+) -> Blocks:
+    """Rows of blocks, 0.2 m deep, one height and any yaw each: too long to walk around, one has to step over them.
+
+    Args:
+        rng: the only source of chance.
+        centres: where [m].
+        length: range of the rows' lengths [m].
+        height: range of their heights [m].
+    """
+    n = len(centres)
+    yaw, long, high = rng.uniform(0, np.pi, n), rng.uniform(*length, n), rng.uniform(*height, n)
+    return Blocks(np.column_stack([centres, yaw, long, np.full(n, 0.2), high]))
 
 
 def joined_share(share: float) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy import ndimage
 
 from vinl.config.errors import InputError
@@ -14,7 +14,7 @@ from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
-from vinl.world.joined import join_blocks, joined_share
+from vinl.world.joined import draw_rows, join_blocks, joined_share
 
 RESOLUTION = 0.05
 """Pitch of the height field [m]."""
@@ -43,6 +43,10 @@ class TerrainConfig:
         start_clear: half-width of the square around the start without blocks [m].
         joined: share of the blocks that touch or overlap another: end to end, at an angle or side by side.
         wall_blocks: blocks on ``walls`` tiles, as a share of those on ``blocks`` tiles.
+        row_density: rows of blocks per m2 on ``blocks`` tiles beyond the first level, the same on all of these.
+        row_length: range of their lengths [m].
+        first_height: range of the blocks' heights on the first level [m], from which they grow evenly to
+            ``block_height`` on the last; None: ``block_height`` on all levels.
     """
 
     slope: float = 0.10
@@ -61,6 +65,9 @@ class TerrainConfig:
     start_clear: float = 0.8
     joined: float = 0.0
     wall_blocks: float = 0.0
+    row_density: float = 0.0
+    row_length: tuple[float, float] = (0.8, 2.0)
+    first_height: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.levels < 1 or self.columns < 1:
@@ -70,7 +77,11 @@ class TerrainConfig:
             raise InputError(f"terrain: the shares of the tile types must add up to 1, got {sum(shares.values()):.3f}")
         if not 0 < self.block_height[0] <= self.block_height[1]:
             raise InputError(f"terrain: block_height must be a rising positive range, got {self.block_height}")
-        if self.block_density < 0 or self.tall_density < 0:
+        if self.first_height is not None and not 0 < self.first_height[0] <= self.first_height[1]:
+            raise InputError(f"terrain: first_height must be a rising positive range, got {self.first_height}")
+        if not 0 < self.row_length[0] <= self.row_length[1]:
+            raise InputError(f"terrain: row_length must be a rising positive range, got {self.row_length}")
+        if min(self.block_density, self.tall_density, self.row_density) < 0:
             raise InputError("terrain: densities must not be negative")
         if not (0 <= self.joined <= 1 and 0 <= self.wall_blocks <= 1 and self.start_clear >= 0):
             raise InputError("terrain: joined and wall_blocks must lie in [0, 1], start_clear must not be negative")
@@ -79,6 +90,14 @@ class TerrainConfig:
         """Share of every tile type, in the order of the columns."""
         names = ("slope", "rough_slope", "stairs_up", "stairs_down", "discrete", "walls", "blocks")
         return {name: getattr(self, name) for name in names}
+
+    def heights_at(self, level: int) -> tuple[float, float]:
+        """Range of the blocks' heights on a level [m]."""
+        if self.first_height is None:
+            return self.block_height
+        part = level / max(self.levels - 1, 1)
+        low, high = (a + part * (b - a) for a, b in zip(self.first_height, self.block_height, strict=True))
+        return low, high
 
     def column_kinds(self) -> list[str]:
         """The tile type of every column."""
@@ -244,16 +263,28 @@ def _tile_blocks(
     partner = joined_share(config.joined)
     clear = config.start_clear + 0.3  # half a block's diagonal more
     centres = scatter_centres(rng, round(wanted / (1 + partner)), TILE / 2, clear, 0.45, taken)
-    blocks = draw_blocks(rng, centres, config.block_height)
+    heights = config.heights_at(level)
+    blocks = draw_blocks(rng, centres, heights)
     if partner > 0:
         joined = join_blocks(rng, blocks, partner).rows
         blocks += Blocks(joined[np.abs(joined[:, :2]).max(1, initial=0) >= clear])
+    if config.row_density > 0 and level > 0 and share == 1:
+        count = round(config.row_density * TILE**2)
+        here = scatter_centres(rng, count, TILE / 2 - 0.3, config.start_clear, 1.0, np.zeros((0, 2)))
+        rows = draw_rows(rng, here, config.row_length, heights)
+        kept = _leave_start(rows.boxes(), config.start_clear)
+        blocks += Blocks(rows.rows[kept])
     return Blocks(blocks.rows + np.array([*middle, 0, 0, 0, 0]))
 
 
 def _off_the_start(boxes: Boxes) -> Boxes:
     """The boxes of a tile that a robot can start beside: they leave a disc of 1.3 m around its middle free."""
+    return Boxes(boxes.rows[_leave_start(boxes, 1.3)])
+
+
+def _leave_start(boxes: Boxes, radius: float) -> Bool[np.ndarray, " n"]:
+    """Which boxes of a tile leave a disc around its middle free [m]."""
     x, y, yaw, length, width = boxes.rows[:, :5].T
     u, v = -np.cos(yaw) * x - np.sin(yaw) * y, np.sin(yaw) * x - np.cos(yaw) * y
     gap = np.hypot(np.maximum(np.abs(u) - length / 2, 0), np.maximum(np.abs(v) - width / 2, 0))
-    return Boxes(boxes.rows[gap > 1.3])
+    return gap > radius
