@@ -12,6 +12,7 @@ from vinl.config.errors import InputError
 from vinl.config.loader import load_config
 from vinl.nav.config import NavConfig
 from vinl.nav.environment import NavEnvironment
+from vinl.nav.home_builder import build_home
 from vinl.nav.home_store import HomeStore
 
 
@@ -35,8 +36,10 @@ def run_nav(
 
     Returns:
         ``steps_per_second`` of all robots, ``blind_steps_per_second`` of the same without images,
-        ``homes_per_second`` built (by all workers, distance fields included), ``home_kilobytes`` of grids and triangles
-        on the device for each home, ``device_gigabytes`` in use by all (GPU only), and what was measured.
+        ``single_steps_per_second`` of ``gymnasium.make("vinl/Nav-v0")`` (CPU only) and ``single_steps_per_cpu_second``,
+        the same for each second of processor time, which other programs hardly change; ``homes_per_second`` built (by
+        all workers, distance fields included) and ``homes_per_cpu_second`` by one core; ``home_kilobytes`` of grids and
+        triangles on the device for each home, ``device_gigabytes`` in use by all (GPU only), and what was measured.
 
     Raises:
         InputError: a number is not positive, or the device is not there.
@@ -57,7 +60,9 @@ def run_nav(
     figures: dict[str, Any] = {
         "steps_per_second": _measure(NavEnvironment(config, store, device), seconds),
         "blind_steps_per_second": _measure(NavEnvironment(replace(config, camera=None), store, device), seconds / 2),
+        **({} if on_gpu else _measure_single(config, store, seconds / 2)),
         "homes_per_second": (homes + store.dropped) / built,
+        "homes_per_cpu_second": _measure_building(config),
         "home_kilobytes": store.memory_bytes / homes / 1e3,
         "homes": homes,
         "dropped": store.dropped,
@@ -87,6 +92,36 @@ def _measure(environment: NavEnvironment, seconds: float) -> float:
         environment.read_measures()
         count += 24
     return count * n / passed
+
+
+def _measure_single(config: NavConfig, store: HomeStore, seconds: float) -> dict[str, float]:
+    """One robot as gymnasium sees it, a depth image a step."""
+    from vinl.nav.gym import NavEnv
+
+    environment = NavEnv(config=replace(config, num_envs=1), store=store)
+    environment.reset(seed=0)
+    environment.action_space.seed(0)
+    actions = [environment.action_space.sample() for _ in range(64)]
+    count, start, used = 0, time.perf_counter(), time.process_time()
+    while (passed := time.perf_counter() - start) < seconds or not count:
+        for action in actions:
+            _, _, reached, late, _ = environment.step(action)
+            if reached or late:
+                environment.reset()
+        count += len(actions)
+    return {
+        "single_steps_per_second": count / passed,
+        "single_steps_per_cpu_second": count / (time.process_time() - used),
+    }
+
+
+def _measure_building(config: NavConfig, count: int = 24) -> float:
+    """Homes in a second of one core, from their seeds, distance fields included."""
+    build_home(0, config)  # compiles the kernels
+    used = time.process_time()
+    for seed in range(count):
+        build_home(config.homes.seed + seed, config)
+    return count / (time.process_time() - used)
 
 
 def _device_bytes(device: str) -> int:

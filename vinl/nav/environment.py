@@ -174,6 +174,7 @@ class NavEnvironment:
         else:
             self.state["chance"].copy_(saved["chance"])
             self._start(torch.ones(self.num_envs, dtype=torch.bool, device=self.device))
+            self.stagger()
         self._observation = None
 
     # ---- its parts, for those who need an episode's last picture --------------------------------------------------
@@ -270,7 +271,9 @@ class NavEnvironment:
         """Let the present episodes look as if each had begun a random while ago, so that not all run out of time at
         once; for the start of a training."""
         generator = torch.Generator().manual_seed(int(self.state["chance"][0].item()))
-        self.state["steps"].copy_(torch.randint(0, self.config.episodes.steps, (self.num_envs,), generator=generator))
+        self.state["steps"].copy_(
+            torch.randint(0, max(self.config.episodes.steps - 1, 1), (self.num_envs,), generator=generator)
+        )
 
     def goals(self) -> Float[Tensor, "n 2"]:
         """Where each robot's goal is [m]."""

@@ -23,7 +23,6 @@ from vinl.nav.environment import NavEnvironment
 from vinl.nav.home_store import HomeStore
 from vinl.nav.measures import EpisodeEnd
 from vinl.nav.picture import draw_robot
-from vinl.world.readers import load_floorplan
 
 ID = "vinl/Nav-v0"
 _HOMES = 8
@@ -95,6 +94,7 @@ class NavEnv(gymnasium.Env):
     Args:
         render_mode: ``"rgb_array"`` or None.
         config, homes, plans, device, overrides: as for ``NavVectorEnv``.
+        store: homes that are there already, in the place of ``homes`` and ``plans``.
 
     Attributes:
         environment: the robot itself.
@@ -110,11 +110,12 @@ class NavEnv(gymnasium.Env):
         plans: Sequence[str] = (),
         device: str = "cpu",
         overrides: Sequence[str] = (),
+        store: HomeStore | None = None,
     ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise InputError(f"render_mode is 'rgb_array' or None, not {render_mode!r}")
         self.render_mode = render_mode
-        self.environment = _build(config, 1, homes, plans, device, overrides)
+        self.environment = _build(config, 1, homes, plans, device, overrides, store)
         self.observation_space, self.action_space = _describe_spaces(self.environment)
         self._way: list[np.ndarray] = []
 
@@ -164,7 +165,13 @@ class NavEnv(gymnasium.Env):
 
 
 def _build(
-    config: str | NavConfig, num_envs: int, homes: int, plans: Sequence[str], device: str, overrides: Sequence[str]
+    config: str | NavConfig,
+    num_envs: int,
+    homes: int,
+    plans: Sequence[str],
+    device: str,
+    overrides: Sequence[str],
+    store: HomeStore | None = None,
 ) -> NavEnvironment:
     if isinstance(config, NavConfig):
         if overrides:
@@ -172,10 +179,9 @@ def _build(
     else:
         config = load_config(NavConfig, config, overrides)
     config = replace(config, num_envs=num_envs, homes=replace(config.homes, count=homes))
-    if plans:
-        store = HomeStore.from_plans([load_floorplan(plan) for plan in plans], config, device)
-    else:
-        store = HomeStore.build(config, device)
+    if store is not None:
+        return NavEnvironment(config, store, device)
+    store = HomeStore.from_paths(plans, config, device) if plans else HomeStore.build(config, device)
     return NavEnvironment(config, store, device)
 
 

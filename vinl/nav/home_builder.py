@@ -13,12 +13,12 @@ from jaxtyping import Float, Int
 from scipy.ndimage import label
 
 from vinl.config.errors import InputError
-from vinl.nav.config import ClutterConfig, NavConfig
+from vinl.nav.config import CameraConfig, ClutterConfig, NavConfig
 from vinl.nav.fields import measure_near_clearance, spread_fields
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import RESOLUTION, FloorPlan
-from vinl.world.mesh import box_mesh
+from vinl.world.mesh import BOTTOM_TRIANGLES, TOP_TRIANGLES, TRIANGLES_PER_BOX, box_mesh
 
 FINE = 2
 """Cells of the clearance grid along a side of a cell of the distance fields."""
@@ -31,6 +31,9 @@ REACH = 0.6
 
 FRINGE = 0.12
 """The distance to the goal is also known where the robot's middle is off the ways, but this far from walls [m]."""
+
+_OVER_CAMERA = 0.6
+"""No motion lifts the camera by so much [m]."""
 
 _LEAST_PAIRS = 0.01
 """At least this share of start and goal pairs must lie within the range of distances."""
@@ -159,7 +162,7 @@ def prepare_home(plan: FloorPlan, seed: int, config: NavConfig) -> BuiltHome | s
     if not len(boxes):
         return f"{plan.name}: there are no walls"
     blocks = _draw_blocks(plan, rng, config.clutter)
-    vertices, faces = box_mesh(boxes + blocks.boxes())
+    vertices, faces = _draw_mesh(boxes + blocks.boxes(), config.camera)
     x0, y0 = plan.frame.xy(first)
     to_xy = np.array([x0, y0])
     return BuiltHome(
@@ -175,6 +178,18 @@ def prepare_home(plan: FloorPlan, seed: int, config: NavConfig) -> BuiltHome | s
         solid=boxes.rows.astype(np.float32),
         blocks=blocks.rows.astype(np.float32),
     )
+
+
+def _draw_mesh(boxes: Boxes, camera: CameraConfig | None) -> tuple[np.ndarray, np.ndarray]:
+    """The boxes without the faces that the camera never sees: bottoms on the floor, tops far above it. Fewer triangles
+    make quicker rays."""
+    vertices, faces = box_mesh(boxes)
+    over = (camera.mount_height if camera is not None else 0.0) + _OVER_CAMERA
+    bottom, top = boxes.rows[:, 5], boxes.rows[:, 6]
+    seen = np.ones((len(boxes), TRIANGLES_PER_BOX), bool)
+    seen[:, BOTTOM_TRIANGLES] = (bottom >= 0.01)[:, None]
+    seen[:, TOP_TRIANGLES] = (top <= over)[:, None]
+    return vertices, np.ascontiguousarray(faces[seen.ravel()])
 
 
 def _largest_region(traversable: np.ndarray) -> np.ndarray | None:

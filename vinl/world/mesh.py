@@ -19,6 +19,9 @@ _TRIANGLES = np.concatenate([_QUADS[:, [0, 1, 2]], _QUADS[:, [0, 2, 3]]])
 TRIANGLES_PER_BOX = len(_TRIANGLES)
 """``box_mesh`` gives every box this many faces, box after box."""
 
+BOTTOM_TRIANGLES, TOP_TRIANGLES = (4, 10), (5, 11)
+"""Which of them lie below and above."""
+
 
 @runtime_checkable
 class HasWalls(Protocol):
