@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import os
-import shlex
 from dataclasses import dataclass
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from vinl.cli.options import parse_options
 from vinl.config.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rich.console import Console
+
+    from vinl.evaluation.evaluate import Protocol
+    from vinl.evaluation.progress import Progress
+    from vinl.evaluation.work import Row
 
 
 @dataclass(frozen=True)
@@ -22,18 +31,27 @@ class Options:
     floorplans: tuple[str, ...] = ()
     """Files (.png, .pgm, ROS .yaml, ProcTHOR .json or .jsonl.gz:17) or names of shipped plans; all shipped ones by
     default."""
-    loco: str = "rough"
-    """Locomotor: a shipped policy's name, or a policy folder."""
-    nav: str = "oracle"
-    """Navigator: oracle (follows the shortest way), a shipped navigation policy's name, or a policy folder."""
+    loco: str | None = None
+    """Locomotor: a shipped policy's name, or a policy folder; rough by default."""
+    nav: str | None = None
+    """Navigator: oracle (follows the shortest way, the default), a shipped navigation policy's name, or a policy
+    folder. With --table it takes the place of the learned navigator of all rows."""
     episodes: int = 10
     """Start/goal pairs in each plan; the same for all seeds."""
     seeds: int = 5
     """Repetitions: a seed changes clutter, heading and joint angles at the start."""
     first_seed: int = 0
     """The first of the seeds."""
-    obstacles: str = "none"
-    """Clutter: none, paper or dense."""
+    obstacles: str | None = None
+    """Clutter: none (the default), paper or dense."""
+    table: bool = False
+    """Walk all rows of a table instead of one robot, each the same episodes, beside the paper's figures."""
+    table_file: str = "eval/table"
+    """Rows of the table: a shipped config or a YAML file."""
+    rows: tuple[str, ...] = ()
+    """Only these rows of the table."""
+    strict: bool = False
+    """A row whose policy is not there is an error; otherwise it is left out, which the table says."""
     video: bool = False
     """Film the first episode of every plan."""
     video_all: bool = False
@@ -61,39 +79,96 @@ class Options:
 def main(argv: list[str]) -> int:
     """Run the evaluation and print where its files lie."""
     options = parse_options(Options, argv, "eval")
-    from rich.console import Console
-
     from vinl.config.loader import load_config
     from vinl.evaluation.config import EvaluationConfig
-    from vinl.evaluation.evaluate import Films, Protocol, check_numbers, evaluate_rows, name_apart
-    from vinl.evaluation.navigator import load_navigator
-    from vinl.evaluation.progress import Progress
-    from vinl.evaluation.report import write_report
-    from vinl.evaluation.results_file import check_out, results_as_dict, strip_command, write_json
-    from vinl.evaluation.summary import print_summary
-    from vinl.evaluation.work import Row, Shard
-    from vinl.policies.io import load_policy
+    from vinl.evaluation.evaluate import Films, Protocol, check_numbers, name_apart
+    from vinl.evaluation.outputs import check_folder
+    from vinl.evaluation.results_file import check_out, strip_command
+    from vinl.evaluation.shard import Shard
     from vinl.world.readers import load_floorplans
 
     out = check_out(options.out)
     workers = os.cpu_count() or 1 if options.workers is None else options.workers
     films: Films = "all" if options.video_all else "first" if options.video else "none"
-    check_numbers(options.episodes, options.seeds, options.first_seed, options.obstacles, workers)
+    check_numbers(options.episodes, options.seeds, options.first_seed, options.obstacles or "none", workers)
+    check_folder(out, options.table)
     shard = Shard.parse(options.shard)
     config = load_config(EvaluationConfig, options.config, options.set)
-    policy = load_policy(options.loco, options.device)
-    navigator = load_navigator(options.nav, config, options.device)
-    plans = load_floorplans(options.floorplans, options.resolution, options.min_speck)
-    if not plans:
-        raise InputError("no floor plan is shipped with this version; give files: --floorplans FILE")
-    seeds = range(options.first_seed, options.first_seed + options.seeds)
-    protocol = Protocol(name_apart(plans), options.episodes, seeds, config, shard, films)
-    row = Row(policy, navigator, options.obstacles)
+
+    def prepare() -> Protocol:
+        plans = load_floorplans(options.floorplans, options.resolution, options.min_speck)
+        if not plans:
+            raise InputError("no floor plan is shipped with this version; give files: --floorplans FILE")
+        seeds = range(options.first_seed, options.first_seed + options.seeds)
+        return Protocol(name_apart(plans), options.episodes, seeds, config, shard, films)
+
     command = ["vinl", "eval", *strip_command(argv)]
-    console = Console()
-    with Progress(console, f"{out} keeps them; the same command goes on from there") as progress:
-        results = evaluate_rows([row], protocol, workers, [out], True, options.fresh, command, progress.show)[0]
-    write_json(out / "results.json", results_as_dict(results, command, workers, shard))
-    write_report(out / "report.html", results, shlex.join(command))
-    print_summary(console, results, out)
+    run = _run_table if options.table else _run_one
+    run(options, out, prepare, workers, command)
     return 0
+
+
+def _run_one(options: Options, out: Path, prepare: Callable[[], Protocol], workers: int, command: list[str]) -> None:
+    from rich.console import Console
+
+    from vinl.evaluation.evaluate import evaluate_rows
+    from vinl.evaluation.outputs import write_run
+    from vinl.evaluation.summary import print_summary
+
+    if options.rows or options.strict:
+        raise InputError("--rows and --strict belong to a table; give --table too")
+    row = _load_row(options.loco or "rough", options.nav or "oracle", options.obstacles or "none", options)
+    protocol, console = prepare(), Console()
+    with _progress(console, out) as progress:
+        results = evaluate_rows([row], protocol, workers, [out], True, options.fresh, command, progress.show)[0]
+    write_run(out, results, command, workers, protocol.shard)
+    print_summary(console, results, out)
+
+
+def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], workers: int, command: list[str]) -> None:
+    from rich.console import Console
+
+    from vinl.config.loader import load_config
+    from vinl.evaluation.evaluate import evaluate_rows
+    from vinl.evaluation.outputs import keep_table, leave_out, write_table
+    from vinl.evaluation.table import TableRow
+    from vinl.evaluation.table_config import TableConfig
+    from vinl.evaluation.table_report import print_table
+
+    for name, given in (("--loco", options.loco), ("--obstacles", options.obstacles)):
+        if given is not None:
+            raise InputError(f"{name} does not go with --table: its rows say who walks, through what clutter")
+    table = load_config(TableConfig, options.table_file).choose(options.rows, options.nav)
+    present, left_out = leave_out(table, options.strict)
+    loaded = [_load_row(row.loco, row.nav, row.obstacles, options) for row in present.values()]
+    protocol, console = prepare(), Console()
+    for name, why in left_out.items():
+        console.print(f"left out: row {name}: {why}", soft_wrap=True)
+    reference = table.reference if table.reference in present else next(iter(present))
+    out.mkdir(parents=True, exist_ok=True)
+    keep_table(out, table, left_out, command)
+    folders = [out / name for name in present]
+    with _progress(console, out) as progress:
+        done = evaluate_rows(loaded, protocol, workers, folders, True, options.fresh, command, progress.show)
+    rows = [
+        TableRow(name, row.title, results, row.paper)
+        for (name, row), results in zip(present.items(), done, strict=True)
+    ]
+    print_table(console, write_table(out, rows, reference, left_out, command, workers, protocol.shard), out)
+
+
+def _load_row(loco: str, nav: str, obstacles: str, options: Options) -> Row:
+    from vinl.config.loader import load_config
+    from vinl.evaluation.config import EvaluationConfig
+    from vinl.evaluation.navigator import load_navigator
+    from vinl.evaluation.work import Row
+    from vinl.policies.io import load_policy
+
+    config = load_config(EvaluationConfig, options.config, options.set)
+    return Row(load_policy(loco, options.device), load_navigator(nav, config, options.device), obstacles)
+
+
+def _progress(console: Console, out: Path) -> Progress:
+    from vinl.evaluation.progress import Progress
+
+    return Progress(console, f"{out} keeps them; the same command goes on from there")

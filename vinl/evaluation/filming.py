@@ -7,7 +7,8 @@ from pathlib import Path
 
 from vinl.evaluation.crew import Context
 from vinl.evaluation.records import Key
-from vinl.evaluation.video import FilmJob, film, name_film
+from vinl.evaluation.video import FilmJob, film
+from vinl.evaluation.video import name_film as name_film
 
 
 def missing_films(wanted: Sequence[Key], films: str, seed: int, folder: Path | None) -> set[Key]:

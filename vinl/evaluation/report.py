@@ -8,19 +8,17 @@ from typing import Any
 
 import jinja2
 
+from vinl.config.loader import load_config
 from vinl.evaluation.blame import FAILURES, read_failure
 from vinl.evaluation.describe import describe_environment
 from vinl.evaluation.drawing import draw_histogram, draw_map
 from vinl.evaluation.metrics import aggregate_episodes
 from vinl.evaluation.records import EpisodeRecord, Results
 from vinl.evaluation.results_file import write_text
+from vinl.evaluation.table_config import PaperFigures, TableConfig
 
-PAPER_ROWS = (
-    ("Paper: ViNL, clutter", "73.6 ± 5.9", "8.19 ± 0.34", "12.1 ± 0.7"),
-    ("Paper: ViNL, no clutter", "86.8 ± 4.7", "7.67 ± 0.35", "2.9 ± 0.3"),
-    ("Paper: Rough, clutter", "40.8 ± 3.5", "7.59 ± 0.17", "16.5 ± 2.5"),
-)
-"""Success in percent, distance [m], foot collisions per metre [paper, table II]."""
+_SHOWN = ("vinl", "vinl_no_clutter", "rough")
+"""Rows of the paper's table that every report shows."""
 
 
 @dataclass(frozen=True)
@@ -68,13 +66,14 @@ def render_report(results: Results, command: str) -> str:
     )
     environment.filters["figure"] = format_figure
     environment.filters["failure"] = read_failure
+    environment.filters["published"] = lambda figure: f"{figure[0]:.1f} ± {figure[1]:.1f}"
     return environment.get_template("report.html.j2").render(
         aggregate=results.aggregate,
         plans=plans,
         kinds=FAILURES,
         failures=[row for row in rows if not row.record.success],
         histograms=histograms,
-        paper=PAPER_ROWS,
+        paper=_read_paper(),
         config=results.config,
         policies=results.policies,
         environment=describe_environment(),
@@ -82,6 +81,12 @@ def render_report(results: Results, command: str) -> str:
         command=command,
         wall_seconds=results.wall_seconds,
     )
+
+
+def _read_paper() -> list[tuple[str, PaperFigures]]:
+    """What the paper found, from the shipped table."""
+    rows = load_config(TableConfig, "eval/table").rows
+    return [(rows[name].title, paper) for name in _SHOWN if (paper := rows[name].paper) is not None]
 
 
 def write_report(path: Path, results: Results, command: str) -> None:

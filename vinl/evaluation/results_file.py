@@ -24,7 +24,7 @@ _IDLE, _IDLE_FLAGS = ("--out", "--workers", "--shard"), ("--fresh",)
 
 
 def results_as_dict(
-    results: Results, command: Sequence[str], workers: int, shard: Shard | None = None
+    results: Results, command: Sequence[str], workers: int | None = None, shard: Shard | None = None
 ) -> dict[str, Any]:
     """Results as plain data. Two runs with the same seed differ in ``timing`` and ``aggregate.wall_seconds`` only.
 

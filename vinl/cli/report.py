@@ -1,0 +1,45 @@
+"""``vinl report``: folders of ``vinl eval`` put together, and their report drawn again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from vinl.cli.options import parse_options
+
+
+@dataclass(frozen=True)
+class Options:
+    """Put folders of vinl eval together (shares of the episodes, rows of a table, whole tables) and draw the report
+    again: results.json and report.html. Nothing is walked."""
+
+    folders: Annotated[tuple[str, ...], tyro.conf.Positional]
+    """Folders that vinl eval wrote."""
+    out: str
+    """Folder for results.json and report.html; with one folder only, it may be that folder."""
+    reference: str | None = None
+    """Row of a table that the others are compared with."""
+
+
+def main(argv: list[str]) -> int:
+    """Merge, write, print."""
+    options = parse_options(Options, argv, "report")
+    from rich.console import Console
+
+    from vinl.evaluation.gather import gather_folders
+    from vinl.evaluation.outputs import write_run, write_table
+    from vinl.evaluation.results_file import check_out
+    from vinl.evaluation.summary import print_summary
+    from vinl.evaluation.table_report import print_table
+
+    out, console = check_out(options.out), Console()
+    found = gather_folders([Path(folder) for folder in options.folders], out, options.reference)
+    if found.is_table:
+        print_table(console, write_table(out, found.rows, found.reference, found.left_out, found.command), out)
+    else:
+        write_run(out, found.rows[0].results, found.command)
+        print_summary(console, found.rows[0].results, out)
+    return 0

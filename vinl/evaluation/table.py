@@ -1,0 +1,109 @@
+"""A table: the figures of several rows on the same episodes, and how they compare."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import combinations
+from typing import Any
+
+from vinl.evaluation.describe import describe_environment
+from vinl.evaluation.metrics import aggregate_episodes
+from vinl.evaluation.paired import compare_rows
+from vinl.evaluation.records import Results
+from vinl.evaluation.results_file import SCHEMA
+from vinl.evaluation.shard import Shard
+from vinl.evaluation.table_config import PaperFigures
+
+PLAN_FIGURES = ("success", "spl", "distance_m", "foot_collisions_per_m", "paper_foot_collisions_per_m")
+"""Figures that the summary has for each floor plan too."""
+
+
+@dataclass(frozen=True, eq=False)
+class TableRow:
+    """A row that was walked.
+
+    Attributes:
+        name: of its folder.
+        title: for people.
+        results: what came out.
+        paper: what the paper found, if it has the row.
+        command: that walked it, if it is another than the table's.
+    """
+
+    name: str
+    title: str
+    results: Results
+    paper: PaperFigures | None = None
+    command: Sequence[str] = ()
+
+
+def summarise_table(
+    rows: Sequence[TableRow],
+    reference: str,
+    left_out: Mapping[str, str],
+    command: Sequence[str],
+    shard: Shard | None = None,
+) -> dict[str, Any]:
+    """The table as plain data, without the episodes: small enough to be kept beside the code.
+
+    Args:
+        rows: in the order of the table.
+        reference: name of the row that the report compares with.
+        left_out: rows that were not walked, and why.
+        command: that made it.
+        shard: which share of the episodes it is.
+    """
+    config = {key: value for key, value in rows[0].results.config.items() if key != "obstacles"}
+    min_metres = config["evaluation"]["min_metres"]
+    return {
+        "schema": SCHEMA,
+        "command": list(command),
+        **({"shard": str(shard)} if shard is not None and shard.count > 1 else {}),
+        "config": config,
+        "environment": describe_environment(),
+        "plans": [{"name": plan.name, "area_m2": round(plan.area_m2, 2)} for plan in rows[0].results.plans],
+        "reference": reference,
+        "rows": {row.name: _summarise_row(row, min_metres) for row in rows},
+        "left_out": dict(left_out),
+        "comparisons": [
+            {
+                "one": a.name,
+                "other": b.name,
+                "same_clutter": a.results.config["obstacles"] == b.results.config["obstacles"],
+                **compare_rows(a.results.records, b.results.records, min_metres),
+            }
+            for a, b in combinations(rows, 2)
+        ],
+        "timing": {row.name: round(row.results.wall_seconds, 2) for row in rows},
+    }
+
+
+def _summarise_row(row: TableRow, min_metres: float) -> dict[str, Any]:
+    results = row.results
+    by_plan = {}
+    for plan in results.plans:
+        figures = aggregate_episodes([r for r in results.records if r.plan == plan.name], min_metres)
+        by_plan[plan.name] = {name: figures[name]["mean"] for name in PLAN_FIGURES} | {
+            "falls": figures["falls"],
+            "episodes": figures["episodes"],
+            "failures": figures["failures"],
+        }
+    return {
+        "title": row.title,
+        "policies": results.policies,
+        "obstacles": results.config["obstacles"]["preset"],
+        "paper": None if row.paper is None else asdict(row.paper),
+        "aggregate": results.aggregate,
+        "by_plan": by_plan,
+    }
+
+
+def find_comparison(data: Mapping[str, Any], one: str, other: str) -> tuple[dict[str, Any], int]:
+    """The comparison of two rows, and the sign that turns its differences into ``one`` - ``other``."""
+    for entry in data["comparisons"]:
+        if (entry["one"], entry["other"]) == (one, other):
+            return entry, 1
+        if (entry["one"], entry["other"]) == (other, one):
+            return entry, -1
+    raise KeyError((one, other))
