@@ -44,6 +44,7 @@ FIGURES = (
     ("leg_block_per_m", "legs on blocks per metre"),
     ("linear_velocity_rmse", "linear RMSE [m/s]"),
     ("yaw_rate_rmse", "yaw RMSE [rad/s]"),
+    ("trunk_over_blocks", "trunk over blocks"),
     ("metres", "metres"),
 )
 
@@ -86,7 +87,7 @@ def measure(herd: Herd, ground: Ground, courses: list[Course], policy: Policy) -
     """Records and figures of one simulator."""
     with one_thread():
         records = run_trial(herd, ground, courses, policy)
-    return records, aggregate_robots(records)
+    return records, aggregate_robots(records, covered=ground.covered())
 
 
 def compare(policy: Policy, config: GroundConfig, commands: str, robots: int, seconds: float) -> dict[str, Any]:

@@ -101,12 +101,14 @@ def main(argv: list[str]) -> int:
     else:
         print_figures(console, results[0])
     if options.step:
-        from vinl.evaluation.step import cross_block, draw_steps
+        from vinl.evaluation.step import cross_block, describe_steps, draw_steps
         from vinl.evaluation.step_film import film_steps
 
         ways = {name: cross_block(p, options.step_height) for name, p in zip(compared, policies, strict=True)}
         draw_steps(ways, options.step_height, out / "step.png")
         film_steps(ways, options.step_height, out / "step.mp4")
+        for name, crossings in ways.items():
+            console.print(f"{name}: {describe_steps(crossings)}", soft_wrap=True, highlight=False)
         console.print(f"one block: {out / 'step.png'}, {out / 'step.mp4'}", soft_wrap=True)
     console.print(f"{results[0].wall_seconds:.0f} s; figures {out / 'results.json'}", soft_wrap=True)
     return 0

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from vinl.config.errors import InputError
 from vinl.evaluation.ground_scan import GroundScan
@@ -85,6 +85,19 @@ class Ground:
     reach: float
     spread: float
     blocks: Blocks
+
+    def on_block(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
+        """Whether points [m] lie on a block, to half a cell of 5 cm."""
+        row, column = np.moveaxis(self.field.frame.cell(xy), -1, 0)
+        return self.field.labels[row, column] == BLOCK
+
+    def covered(self) -> float | None:
+        """Share of the ground within reach that blocks cover; None without blocks."""
+        if not len(self.blocks):
+            return None
+        x, y = self.field.frame.centres()
+        inside = np.ix_(np.abs(y) < self.reach, np.abs(x) < self.reach)
+        return float((self.field.labels[inside] == BLOCK).mean())
 
     def mesh(self) -> Mesh:
         """What a camera sees: blocks as boxes on a plane, or the height field."""

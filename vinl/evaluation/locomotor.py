@@ -129,7 +129,8 @@ def compare_locomotors(
             "seconds": seconds,
             "seed": seed,
         }
-        figures = aggregate_robots(records, height_shares(_ground(grounds[p])))
+        ground = _ground(grounds[p])
+        figures = aggregate_robots(records, height_shares(ground), ground.covered())
         results.append(LocomotorResults(records, figures, {"locomotion": describe_policy(policy)}, config, wall))
     return results
 

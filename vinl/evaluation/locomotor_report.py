@@ -23,6 +23,7 @@ _COLUMNS = (
     ("leg_block_per_m", "legs/m", 2),
     ("linear_velocity_rmse", "m/s", 3),
     ("yaw_rate_rmse", "rad/s", 3),
+    ("trunk_over_blocks", "over", 2),
 )
 """Figures of the table: name, title, digits."""
 
@@ -65,9 +66,9 @@ def print_comparison(console: Console, compared: Mapping[str, LocomotorResults])
     for name, results in compared.items():
         a, cells = results.aggregate, []
         for key, _, digits in _COLUMNS:
-            interval = a["ci95"].get(key)
+            value, interval = a.get(key), a["ci95"].get(key)
             spread = f" ±{(interval[1] - interval[0]) / 2:.{digits}f}" if interval and key in _SPREAD else ""
-            cells.append("-" if a[key] is None else f"{a[key]:.{digits}f}{spread}")
+            cells.append("-" if value is None else f"{value:.{digits}f}{spread}")
         table.add_row(name, *cells, f"{100 * a['falls']:.1f} %")
     console.print(table)
     _print_heights(console, compared)

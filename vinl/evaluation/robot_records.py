@@ -33,6 +33,8 @@ class RobotRecord:
     settled_steps: int = 0
     foot_block_steps: int = 0
     leg_block_steps: int = 0
+    over_block_steps: int = 0
+    """Steps in which the middle of the trunk was above a block."""
     foot_pair_steps: list[int] = field(default_factory=lambda: [0, 0])
     """Steps in which a front foot, a rear foot touched a block."""
     leg_pair_steps: list[int] = field(default_factory=lambda: [0, 0])
@@ -44,13 +46,16 @@ class RobotRecord:
 
 
 def aggregate_robots(
-    records: Sequence[RobotRecord], height_shares: Float[np.ndarray, " bins"] | None = None
+    records: Sequence[RobotRecord],
+    height_shares: Float[np.ndarray, " bins"] | None = None,
+    covered: float | None = None,
 ) -> dict[str, Any]:
     """The figures of all robots. ``falls`` is the share of robots that fell at least once.
 
     Args:
         records: of all robots.
         height_shares: share of the blocks in every bin of height; without blocks None.
+        covered: share of the ground that blocks cover; without blocks None.
     """
     columns = _columns(records)
     n = len(records)
@@ -80,6 +85,8 @@ def aggregate_robots(
     for limb in ("foot", "leg"):
         for part in ("", "_front", "_rear"):
             add(f"{limb}{part}_block_per_m", f"{limb}{part}", "metres")
+    if covered:
+        add("trunk_over_blocks", "over", "steps", lambda share: share / covered)
     figures["metres"] = float(columns["metres"].sum())
     levels = [r.level for r in records if r.level is not None]
     figures["mean_level"] = float(np.mean(levels)) if levels else None
@@ -107,6 +114,7 @@ def _columns(records: Sequence[RobotRecord]) -> dict[str, Float[np.ndarray, " n"
         ("metres", lambda r: r.metres),
         ("foot", lambda r: r.foot_block_steps),
         ("leg", lambda r: r.leg_block_steps),
+        ("over", lambda r: r.over_block_steps),
         ("foot_front", lambda r: r.foot_pair_steps[0]),
         ("foot_rear", lambda r: r.foot_pair_steps[1]),
         ("leg_front", lambda r: r.leg_pair_steps[0]),

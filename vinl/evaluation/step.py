@@ -96,6 +96,20 @@ def cross_block(policy: Policy, height: float = 0.15, speed: float = 0.5, crossi
     ]
 
 
+def describe_steps(crossings: list[Crossing]) -> str:
+    """How many crossings touched nothing, in one line."""
+    clean = sum(way.done and not way.foot_touches.any() and not way.leg_touches.any() for way in crossings)
+    feet, legs = (
+        sum(int(touches.any(1).sum()) for touches in side)
+        for side in ([way.foot_touches for way in crossings], [way.leg_touches for way in crossings])
+    )
+    fell = len(crossings) - sum(way.done for way in crossings)
+    return (
+        f"{clean} of {len(crossings)} crossings without a touch, {fell} not finished; control steps on the block: "
+        f"feet {feet}, legs {legs}"
+    )
+
+
 def draw_steps(ways: Mapping[str, list[Crossing]], height: float, path: Path) -> None:
     """Height of the feet over the way, front and rear apart, one row of panels for each policy.
 

@@ -63,6 +63,8 @@ def run_trial(
         metres = np.linalg.norm(herd.qpos[:, :2] - before, axis=1)
         _add_errors(records, herd.qpos, herd.qvel, commands[step], age >= SETTLED)
         _add_touches(records, herd.touches, metres, herd.fallen)
+        for k in np.flatnonzero(ground.on_block(herd.qpos[:, :2])).tolist():
+            records[k].over_block_steps += 1
         age += 1
         away = herd.fallen | (np.abs(herd.qpos[:, :2] - homes).max(1) > ground.reach)
         for k in np.flatnonzero(away).tolist():
