@@ -11,6 +11,7 @@ from vinl.config.errors import InputError
 
 COMMANDS = {
     "eval": ("vinl.cli.eval", "the whole chain in MuJoCo: a robot crosses floor plans; report, figures, video"),
+    "report": ("vinl.cli.report", "put folders of vinl eval together: shares, rows, tables; draw the report again"),
     "eval-loco": ("vinl.cli.eval_loco", "the locomotor alone in MuJoCo, under random commands"),
     "eval-nav": ("vinl.cli.eval_nav", "the navigator alone, in homes that it has never seen"),
     "train-loco": ("vinl.cli.train_loco", "train a locomotor (needs the train extra)"),
