@@ -31,7 +31,7 @@ def spread_distances(
 ):
     """Dijkstra's search with buckets, one thread a goal. Cells of mask 2 are passed, cells of mask 1 only reached.
 
-    ``head`` holds a linked list of waiting entries for each bucket, ``following`` and ``cell`` the entries.
+    ``distance`` begins far off, and below 0 where no way enters; ``head`` holds a linked list of waiting entries for each bucket, ``following`` and ``cell`` the entries.
     """
     k = wp.tid()
     used = int(1)  # entries taken from the pool so far
@@ -55,7 +55,7 @@ def spread_distances(
                 for s in range(offset.shape[0]):
                     there = here + offset[s]
                     total = band + cost[s]
-                    if mask[there] != wp.uint8(0) and total < distance[k, there]:
+                    if total < distance[k, there]:
                         fresh = spare
                         if fresh >= 0:
                             spare = following[k, fresh]
@@ -71,6 +71,22 @@ def spread_distances(
                             waiting = waiting + 1
             entry = head[k, bucket]
         band = band + 1
+
+
+@wp.kernel
+@no_type_check
+def write_metres(
+    counted: wp.array(dtype=wp.int32, ndim=3),
+    border: wp.int32,
+    far: wp.int32,
+    unit: wp.float32,
+    metres: wp.array(dtype=wp.float16, ndim=3),
+):
+    """Counted distances (goal, row, column) without their border as metres (row, column, goal)."""
+    r, c = wp.tid()
+    for k in range(metres.shape[2]):
+        steps = counted[k, r + border, c + border]
+        metres[r, c, k] = wp.where(steps >= 0 and steps < far, wp.float16(wp.float32(steps) * unit), wp.float16(wp.inf))
 
 
 @wp.kernel

@@ -9,14 +9,14 @@ import numpy as np
 import warp as wp
 from jaxtyping import Bool, Float, Int, UInt8
 
-from vinl.nav.field_kernels import measure_across, measure_down, spread_distances
+from vinl.nav.field_kernels import measure_across, measure_down, spread_distances, write_metres
 
 _UNIT = 100
 """Distances are counted in hundredths of a cell."""
 
 _STEPS = [(i, j) for i in range(-2, 3) for j in range(-2, 3) if math.gcd(i, j) == 1]
 _BORDER = 2
-_FAR = 2**30
+_FAR, _CLOSED = 2**30, -1
 
 
 def spread_fields(
@@ -40,7 +40,8 @@ def spread_fields(
     cost = np.rint(np.hypot(steps[:, 0], steps[:, 1]) * _UNIT).astype(np.int32)
     start = ((goals[:, 0] + _BORDER) * width + goals[:, 1] + _BORDER).astype(np.int32)
     count = len(goals)
-    distance = np.full((count, cells), _FAR, np.int32)
+    # cells that no way enters are nearer than anything, so that one comparison tells both
+    distance = np.tile(np.where(padded.ravel() == 0, _CLOSED, _FAR).astype(np.int32), (count, 1))
     pool = 2 * cells
     wp.launch(
         spread_distances,
@@ -57,9 +58,16 @@ def spread_fields(
         ],
         device="cpu",
     )
-    inner = distance.reshape(count, *padded.shape)[:, _BORDER:-_BORDER, _BORDER:-_BORDER]
-    metres = np.where(inner < _FAR, inner * np.float32(resolution / _UNIT), np.float32(np.inf)).astype(np.float16)
-    return np.ascontiguousarray(np.moveaxis(metres, 0, -1))
+    metres = np.empty((*mask.shape, count), np.float16)
+    counted = _wrap(distance.reshape(count, *padded.shape))
+    wp.launch(
+        write_metres,
+        dim=mask.shape,
+        inputs=[counted, _BORDER, _FAR, resolution / _UNIT],
+        outputs=[_wrap(metres)],
+        device="cpu",
+    )
+    return metres
 
 
 def measure_near_clearance(
