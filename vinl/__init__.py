@@ -12,30 +12,62 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from vinl.config.errors import InputError as InputError
     from vinl.config.loader import load_config as load_config
+    from vinl.evaluation.config import EvaluationConfig as EvaluationConfig
     from vinl.evaluation.evaluate import evaluate as evaluate
+    from vinl.notebook.film import Film as Film
+    from vinl.notebook.film import show_video as show_video
+    from vinl.notebook.own import as_locomotor as as_locomotor
+    from vinl.notebook.own import as_navigator as as_navigator
+    from vinl.notebook.plans import draw_plan as draw_plan
+    from vinl.notebook.plans import sample_routes as sample_routes
+    from vinl.notebook.plans import scatter_clutter as scatter_clutter
+    from vinl.notebook.training import Training as Training
+    from vinl.notebook.training import train as train
+    from vinl.notebook.walk import Walk as Walk
+    from vinl.notebook.walk import walk as walk
     from vinl.policies.card import PolicyCard as PolicyCard
     from vinl.policies.io import list_policies as list_policies
     from vinl.policies.io import load_policy as load_policy
     from vinl.policies.io import save_policy as save_policy
+    from vinl.robot.cameras import LOCOMOTION_CAMERA as LOCOMOTION_CAMERA
+    from vinl.robot.cameras import NAVIGATION_CAMERA as NAVIGATION_CAMERA
+    from vinl.robot.cameras import Camera as Camera
     from vinl.world.blocks import Blocks as Blocks
     from vinl.world.boxes import Boxes as Boxes
     from vinl.world.floorplan import FloorPlan as FloorPlan
+    from vinl.world.homes import generate_home as generate_home
     from vinl.world.readers import load_floorplan as load_floorplan
     from vinl.world.readers import shipped_floorplans as shipped_floorplans
 
 _WHERE = {
     "Blocks": "vinl.world.blocks",
     "Boxes": "vinl.world.boxes",
+    "Camera": "vinl.robot.cameras",
+    "EvaluationConfig": "vinl.evaluation.config",
+    "Film": "vinl.notebook.film",
     "FloorPlan": "vinl.world.floorplan",
     "InputError": "vinl.config.errors",
+    "LOCOMOTION_CAMERA": "vinl.robot.cameras",
+    "NAVIGATION_CAMERA": "vinl.robot.cameras",
     "PolicyCard": "vinl.policies.card",
+    "Training": "vinl.notebook.training",
+    "Walk": "vinl.notebook.walk",
+    "as_locomotor": "vinl.notebook.own",
+    "as_navigator": "vinl.notebook.own",
+    "draw_plan": "vinl.notebook.plans",
     "evaluate": "vinl.evaluation.evaluate",
+    "generate_home": "vinl.world.homes",
     "list_policies": "vinl.policies.io",
     "load_config": "vinl.config.loader",
     "load_floorplan": "vinl.world.readers",
     "load_policy": "vinl.policies.io",
+    "sample_routes": "vinl.notebook.plans",
     "save_policy": "vinl.policies.io",
+    "scatter_clutter": "vinl.notebook.plans",
     "shipped_floorplans": "vinl.world.readers",
+    "show_video": "vinl.notebook.film",
+    "train": "vinl.notebook.training",
+    "walk": "vinl.notebook.walk",
 }
 
 __all__ = sorted([*_WHERE, "__version__"])  # pyright: ignore[reportUnsupportedDunderAll]

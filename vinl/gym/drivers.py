@@ -7,35 +7,14 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from vinl.config.errors import InputError
 from vinl.evaluation.batches import batch_navigator, batch_policy
 from vinl.evaluation.config import EvaluationConfig
 from vinl.evaluation.eyes import Eyes, open_eyes
 from vinl.evaluation.navigator import Navigator, check_choice, load_navigator
-from vinl.evaluation.senses import check_senses, give_senses
+from vinl.evaluation.senses import give_senses
 from vinl.evaluation.walker import joint_targets
 from vinl.gym.trip import Trip
-from vinl.policies.io import list_policies, load_policy
 from vinl.policies.policy import Policy
-
-BEST_FIRST = ("loco", "teacher", "rough")
-"""Shipped locomotors, the one that is wanted most first."""
-
-
-def choose_locomotor(locomotor: str | Path | Policy | None) -> Policy:
-    """The policy itself, the one of that name, or the best shipped one.
-
-    Raises:
-        InputError: there is none, or it is no locomotor.
-    """
-    if locomotor is None:
-        shipped = list_policies()
-        locomotor = next((name for name in BEST_FIRST if name in shipped), None)
-        if locomotor is None:
-            raise InputError("no locomotor is shipped with this version; give a policy folder")
-    policy = load_policy(locomotor) if isinstance(locomotor, (str, Path)) else locomotor
-    check_senses(policy)
-    return policy
 
 
 class Legs:

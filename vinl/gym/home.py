@@ -14,6 +14,7 @@ from jaxtyping import UInt8
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.config.loader import load_config
+from vinl.evaluation.choosing import choose_locomotor
 from vinl.evaluation.config import EvaluationConfig
 from vinl.evaluation.crew import one_thread
 from vinl.evaluation.episodes import draw_routes, draw_setup
@@ -21,7 +22,7 @@ from vinl.evaluation.odometry import measure_twist
 from vinl.evaluation.records import plain_record
 from vinl.gym.actions import JOINT_REACH, action_of, check_action, joint_target_of, velocity_of
 from vinl.gym.chase import ChaseView
-from vinl.gym.drivers import Guide, Legs, choose_locomotor
+from vinl.gym.drivers import Guide, Legs
 from vinl.gym.senses import AgentSenses, Cameras, choose_cameras
 from vinl.gym.trip import Trip
 from vinl.nav.config import NavConfig

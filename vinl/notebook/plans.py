@@ -1,0 +1,86 @@
+"""Floor plans, their clutter and ways through them: drawn by a seed, shown as pictures."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from PIL import Image
+
+from vinl.config.errors import InputError
+from vinl.config.fields import closest
+from vinl.world.blocks import Blocks
+from vinl.world.clutter import CLUTTER, ClutterPreset, scatter_blocks
+from vinl.world.drawing import draw_floorplan
+from vinl.world.floorplan import FloorPlan
+from vinl.world.readers import load_floorplan
+from vinl.world.start_goal import StartGoal, sample_start_goals
+
+_DPI = 90
+
+
+def open_plan(plan: str | Path | FloorPlan) -> FloorPlan:
+    """The plan itself, or the one of that name or file."""
+    return plan if isinstance(plan, FloorPlan) else load_floorplan(plan)
+
+
+def sample_routes(
+    plan: str | Path | FloorPlan, count: int = 1, seed: int = 0, min_distance: float = 5.0
+) -> list[StartGoal]:
+    """Pairs of start and goal, at least so far apart [m] where the plan is large enough.
+
+    Raises:
+        InputError: the plan has no room for the robot.
+    """
+    return sample_start_goals(open_plan(plan), count, np.random.default_rng(seed), min_distance)
+
+
+def scatter_clutter(
+    plan: str | Path | FloorPlan,
+    preset: str | ClutterPreset = "paper",
+    seed: int = 0,
+    routes: Sequence[StartGoal] = (),
+) -> Blocks:
+    """Blocks on the free floor of a plan.
+
+    Args:
+        plan: the floor plan.
+        preset: ``"none"``, ``"paper"``, ``"dense"``, or how many, how large and how far apart.
+        seed: of the draw.
+        routes: their starts and goals are kept clear, as in an episode.
+
+    Raises:
+        InputError: there is no preset of that name.
+    """
+    if isinstance(preset, str):
+        if preset not in CLUTTER:
+            known = ", ".join(CLUTTER)
+            raise InputError(f"clutter {preset!r} is no preset{closest(preset, CLUTTER)}; known: {known}")
+        preset = CLUTTER[preset]
+    clear = np.array([point for route in routes for point in (route.start, route.goal)]).reshape(-1, 2)
+    return scatter_blocks(open_plan(plan), preset, np.random.default_rng(seed), clear)
+
+
+def draw_plan(
+    plan: str | Path | FloorPlan,
+    blocks: Blocks | None = None,
+    routes: Sequence[StartGoal] = (),
+    paths: Sequence[Float[np.ndarray, "k 2"]] = (),
+    title: str | None = None,
+) -> Image.Image:
+    """A plan from above.
+
+    Args:
+        plan: the floor plan.
+        blocks: its clutter.
+        routes: a dot with its heading for each start, a ring for each goal.
+        paths: lines of points [m], for example ``walk.trace.path``.
+        title: over the picture; name and free area by default, "" leaves it away.
+    """
+    figure = draw_floorplan(open_plan(plan), None, blocks, routes, paths, title)
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=_DPI)
+    return Image.open(file).convert("RGB")
