@@ -16,7 +16,15 @@ from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.nav.config import NavConfig
 from vinl.nav.ppo_config import PpoConfig
-from vinl.nav.training import build_actor, build_algorithm, load_start, make_card, separate
+from vinl.nav.training import (
+    build_actor,
+    build_algorithm,
+    load_critic,
+    load_start,
+    make_card,
+    save_critic,
+    separate,
+)
 from vinl.policies.io import load_policy, save_policy
 from vinl.policies.nav_actor import NavActor
 
@@ -94,6 +102,23 @@ def test_more_iterations_go_on_and_another_run_starts_from_the_policy(tmp_path, 
     assert [row["samples"] for row in rows(first)] == [32, 64, 96]
     assert train(small, second, "--iterations", "1", "--from", str(first), "ppo.learning_rate=2e-4") == 0
     assert load_policy(second).card.training["origin"] == {"policy": str(first), "samples": 96}
+
+
+def test_who_starts_from_a_run_gets_its_critic(tmp_path):
+    config = build_config(NavConfig, {"num_envs": 4, "camera": None, "network": {"hidden": 8, "layers": 1}})
+    first, second = build_algorithm(config, "cpu").model, build_algorithm(config, "cpu").model
+    with torch.no_grad():
+        first.log_std.fill_(-1.2)
+    assert not torch.equal(first.value[0].weight, second.value[0].weight)
+    assert not load_critic(second, tmp_path)  # a policy alone
+    save_critic(first, tmp_path)
+    assert load_critic(second, tmp_path)
+    assert torch.equal(first.value[0].weight, second.value[0].weight) and second.log_std[0].item() == pytest.approx(-1.2)
+    wider = build_config(NavConfig, {"num_envs": 4, "camera": None, "network": {"hidden": 16, "layers": 1}})
+    assert not load_critic(build_algorithm(wider, "cpu").model, tmp_path)
+    (tmp_path / "critic.safetensors").write_bytes(b"broken")
+    with pytest.raises(InputError, match=r"critic\.safetensors is broken"):
+        load_critic(second, tmp_path)
 
 
 @pytest.mark.slow

@@ -10,6 +10,8 @@ from typing import Any
 
 import torch
 from rich.console import Console
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
 from tensordict import TensorDict
 
 from vinl.config.errors import InputError
@@ -28,6 +30,9 @@ from vinl.rl.recurrent_model import RecurrentActorCritic
 from vinl.rl.recurrent_ppo import RecurrentPPO, RecurrentPpoSettings
 from vinl.rl.recurrent_storage import RecurrentStorage
 from vinl.rl.run_folder import RunFolder
+
+CRITIC = "critic.safetensors"
+"""File of a run beside its policy."""
 
 _SEEDS_BETWEEN = 10_000_000
 """Each process has homes of its own: their seeds lie this far apart."""
@@ -100,7 +105,8 @@ def train_navigator(
         name: of the policy; defaults to the folder's.
         save_every: seconds between checkpoints.
         iterations: updates in all; defaults to the configuration's.
-        from_policy: start from the weights of this policy or run; default: fresh ones.
+        from_policy: start from the weights of this policy or run, of a run from its critic and spread of the actions
+            too; default: fresh ones.
         profile: write where the time of one iteration goes to ``profile.txt`` in the folder.
 
     Returns:
@@ -129,6 +135,9 @@ def train_navigator(
     own = separate(config, peers.rank, peers.count)
     environment = build_environment(own, device, peers)
     algorithm = build_algorithm(config, device, peers, None if start is None else start[0])
+    if start is not None:
+        load_critic(algorithm.model, Path(str(from_policy)))
+        peers.share(algorithm.model)
     commit = find_commit()
 
     def write(model: RecurrentActorCritic, samples: int, folder: Path) -> None:
@@ -138,6 +147,7 @@ def train_navigator(
     def export(model: RecurrentActorCritic, samples: int) -> None:
         if peers.leads:
             write(model, samples, run.policy)
+            save_critic(model, run.path)
 
     def schedule(learner: RecurrentPPO, share: float) -> None:
         learner.rate.limit(*config.ppo.rate_limits(share))
@@ -310,6 +320,30 @@ def load_start(policy: str, config: NavConfig) -> tuple[dict[str, torch.Tensor],
         other = [f"{k} {given.get(k)} instead of {wanted[k]}" for k in wanted if given.get(k) != wanted[k]]
         raise InputError(f"--from {policy}: another network than the config's: {', '.join(other)}")
     return loaded.network.state_dict(), loaded.card
+
+
+def save_critic(model: RecurrentActorCritic, folder: Path) -> None:
+    """What a policy folder leaves away, for ``--from``: the critic, and the spread of the actions."""
+    rest = {k: v.detach().cpu().contiguous() for k, v in model.state_dict().items() if not k.startswith("actor.")}
+    scratch = folder / (CRITIC + ".new")
+    save_file(rest, scratch)
+    scratch.replace(folder / CRITIC)
+
+
+def load_critic(model: RecurrentActorCritic, folder: Path) -> bool:
+    """Take up what ``save_critic`` left in a run's folder, if there is such a file and it is of the same shape."""
+    file = folder / CRITIC
+    if not file.is_file():
+        return False
+    try:
+        rest = load_file(file)
+    except (SafetensorError, OSError) as error:
+        raise InputError(f"{file} is broken ({error}); remove it to start with a fresh critic") from None
+    own = {k: v for k, v in model.state_dict().items() if not k.startswith("actor.")}
+    if {k: v.shape for k, v in rest.items()} != {k: v.shape for k, v in own.items()}:
+        return False
+    model.load_state_dict(rest, strict=False)
+    return True
 
 
 def make_card(
