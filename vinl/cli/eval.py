@@ -38,6 +38,8 @@ class Options:
     folder. With --table it takes the place of the learned navigator of all rows."""
     episodes: int = 10
     """Start/goal pairs in each plan; the same for all seeds."""
+    routes: str | None = None
+    """YAML file with start/goal pairs of your own in place of drawn ones: PLAN: [{start: [x, y], goal: [x, y]}]."""
     seeds: int = 5
     """Repetitions: a seed changes clutter, heading and joint angles at the start."""
     first_seed: int = 0
@@ -84,6 +86,7 @@ def main(argv: list[str]) -> int:
     from vinl.evaluation.evaluate import Films, Protocol, check_numbers, name_apart
     from vinl.evaluation.outputs import check_folder
     from vinl.evaluation.results_file import check_out, strip_command
+    from vinl.evaluation.routes import read_routes
     from vinl.evaluation.shard import Shard
     from vinl.world.readers import load_floorplans
 
@@ -100,7 +103,11 @@ def main(argv: list[str]) -> int:
         if not plans:
             raise InputError("no floor plan is shipped with this version; give files: --floorplans FILE")
         seeds = range(options.first_seed, options.first_seed + options.seeds)
-        return Protocol(name_apart(plans), options.episodes, seeds, config, shard, films)
+        named, episodes, routes = name_apart(plans), options.episodes, None
+        if options.routes is not None:
+            routes = read_routes(Path(options.routes), named)
+            episodes = len(next(iter(routes.values())))
+        return Protocol(named, episodes, seeds, config, shard, films, routes)
 
     command = ["vinl", "eval", *strip_command(argv)]
     run = _run_table if options.table else _run_one

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -21,6 +21,8 @@ from vinl.evaluation.journal import Journal, read_wall_seconds
 from vinl.evaluation.metrics import aggregate_episodes
 from vinl.evaluation.navigator import ORACLE, Navigator, load_navigator
 from vinl.evaluation.records import Episode, Key, Results
+from vinl.evaluation.routes import describe_routes
+from vinl.evaluation.senses import check_cameras
 from vinl.evaluation.senses import check_senses as check_senses
 from vinl.evaluation.shard import Shard
 from vinl.evaluation.video import FilmJob
@@ -29,6 +31,7 @@ from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
 from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan
+from vinl.world.start_goal import StartGoal
 
 Films = Literal["none", "first", "all"]
 MAX_EPISODES, MAX_SEEDS, MAX_WORKERS = 10_000, 1_000, 1_024
@@ -45,6 +48,7 @@ class Protocol:
         config: limits and rules.
         shard: which share of the episodes is walked.
         films: which episodes are filmed: none, the first of every plan, or all of the first seed.
+        routes: start/goal pairs of one's own for every plan, ``episodes`` each, see ``routes``; None: they are drawn.
     """
 
     plans: Sequence[FloorPlan]
@@ -53,6 +57,7 @@ class Protocol:
     config: EvaluationConfig = field(default_factory=EvaluationConfig)
     shard: Shard = field(default_factory=Shard)
     films: Films = "none"
+    routes: Mapping[str, Sequence[StartGoal]] | None = None
 
     def describe(self, row: Row) -> dict[str, Any]:
         """What the episodes of a row depend on, as plain data."""
@@ -61,7 +66,14 @@ class Protocol:
             "obstacles": {"preset": row.obstacles, **asdict(CLUTTER[row.obstacles])},
             "episodes_per_plan": self.episodes,
             "seeds": list(self.seeds),
+            **({} if self.routes is None else {"routes": describe_routes(self.routes)}),
         }
+
+    def find_routes(self, plan: FloorPlan) -> list[StartGoal]:
+        """The start/goal pairs of a plan."""
+        if self.routes is None:
+            return draw_routes(plan, self.episodes, self.config)
+        return list(self.routes[plan.name])
 
 
 def evaluate(
@@ -143,12 +155,13 @@ def evaluate_rows(
     """
     for row in rows:
         check_senses(row.locomotor)
+        check_cameras(row.locomotor, row.navigator)
     began, workers = time.perf_counter(), max(workers, 1)
     where: Sequence[Path | None] = folders or [None] * len(rows)
     routes = []
     for k, plan in enumerate(protocol.plans):
         on_progress("plan", k, len(protocol.plans))
-        routes.append(draw_routes(plan, protocol.episodes, protocol.config))
+        routes.append(protocol.find_routes(plan))
     wanted = list_keys(protocol.plans, protocol.episodes, protocol.seeds, protocol.shard)
     if not wanted:
         raise InputError(f"--shard {protocol.shard}: there are not so many episodes; take fewer shards")

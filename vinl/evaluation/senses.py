@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from vinl.config.errors import InputError
+from vinl.config.fields import closest
 from vinl.evaluation.eyes import Eyes, open_eyes
 from vinl.evaluation.ground_scan import GroundScan
 from vinl.policies.policy import Policy
+from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
 from vinl.robot.observation import OBSERVATION_SIZE, PROPRIOCEPTION_SIZE, SCAN_SIZE, observe
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
+
+MOUNT_REACH = 0.25
+"""So far from its place on the trunk a camera may be mounted [m]: anywhere at the robot's head."""
 
 
 class Senses:
@@ -43,8 +49,10 @@ class Senses:
         ground = np.zeros((len(qpos), SCAN_SIZE)) if self._scan is None else self._scan.read(qpos)
         observation = observe(np, qpos, qvel, command, actions, ground)[:, : self._size]
         if self._eyes is None:
-            return self._locomotor.act(observation)
-        return self._locomotor.act(observation, self._eyes.look(qpos, rows))
+            answer = self._locomotor.act(observation)
+        else:
+            answer = self._locomotor.act(observation, self._eyes.look(qpos, rows))
+        return check_actions(answer, len(qpos), self._locomotor)
 
 
 def give_senses(locomotor: Policy, plan: FloorPlan, blocks: Sequence[Blocks], ceiling: float | None = None) -> Senses:
@@ -52,6 +60,44 @@ def give_senses(locomotor: Policy, plan: FloorPlan, blocks: Sequence[Blocks], ce
     scan = GroundScan(plan, blocks) if locomotor.card.observation_size > PROPRIOCEPTION_SIZE else None
     eyes = None if locomotor.camera is None else open_eyes(plan, blocks, locomotor.camera, ceiling)
     return Senses(locomotor, scan, eyes)
+
+
+def check_actions(actions: np.ndarray, n: int, locomotor: Policy) -> np.ndarray:
+    """What a locomotor answered, if it makes sense.
+
+    Raises:
+        InputError: another shape than (n, 12), or numbers that are not finite.
+    """
+    if np.shape(actions) != (n, 12):
+        raise InputError(f"locomotor {locomotor.card.name} must return ({n}, 12) actions, got {np.shape(actions)}")
+    if not np.isfinite(actions).all():
+        raise InputError(f"locomotor {locomotor.card.name} returned actions that are not finite (NaN or infinite)")
+    return actions
+
+
+def check_cameras(*seeing: Any) -> None:
+    """Refuse a policy or navigator that sees through a camera that the robot does not carry.
+
+    Raises:
+        InputError: the camera's name is that of neither camera, or it is mounted where neither could be.
+    """
+    for one in seeing:
+        camera = one.camera
+        if camera is None:
+            continue
+        name = one.card.name if hasattr(one, "card") else type(one).__name__
+        known = {mount.name: mount for mount in (LOCOMOTION_CAMERA, NAVIGATION_CAMERA)}
+        if camera.name not in known:
+            raise InputError(
+                f"{name} sees through a camera {camera.name!r} that the robot lacks"
+                f"{closest(camera.name, known)}; it carries: {', '.join(known)}"
+            )
+        away = float(np.linalg.norm(np.subtract(camera.position, known[camera.name].position)))
+        if away > MOUNT_REACH:
+            raise InputError(
+                f"{name} sees through a camera at {tuple(camera.position)} m on the trunk; the robot's {camera.name} "
+                f"camera is at {known[camera.name].position}, and can be moved by {MOUNT_REACH} m"
+            )
 
 
 def check_senses(policy: Policy) -> None:
