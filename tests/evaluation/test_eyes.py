@@ -7,9 +7,12 @@ import pytest
 
 from vinl.evaluation.eyes import Eyes, open_eyes
 from vinl.robot.aliengo import home_qpos
-from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
+from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
+from vinl.robot.rotation import matrix_of
+from vinl.sensing.depth import DepthCamera
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
+from vinl.world.mesh import floorplan_mesh
 
 LEVEL = replace(NAVIGATION_CAMERA, pitch_down=0.0, width=9, height=9)
 BLOCK = Blocks(np.array([[6.0, 3.0, 0.0, 0.2, 0.5, 0.5]]))
@@ -53,6 +56,26 @@ def test_a_ceiling_is_seen_if_there_is_one(two_rooms: FloorPlan) -> None:
     assert under[0, 4, 4] == pytest.approx((2.5 - z) / np.sin(np.radians(60)), abs=1e-3)
 
 
+@pytest.mark.parametrize("ceiling", [None, 2.4])
+@pytest.mark.parametrize("camera", [LOCOMOTION_CAMERA, NAVIGATION_CAMERA], ids=lambda camera: camera.name)
+def test_what_is_left_out_of_the_mesh_is_never_seen(
+    two_rooms: FloorPlan, camera: Camera, ceiling: float | None
+) -> None:
+    """The same images as with every triangle of the home, the floor's too, from a trunk that sways and tumbles."""
+    rng = np.random.default_rng(0)
+    poses = np.stack([stand(x, y, yaw) for x, y, yaw in rng.uniform([1, 2, -3], [8.5, 5.5, 3], (40, 3))])
+    poses[:, 2] += rng.uniform(-0.2, 0.3, 40)
+    tilt = rng.normal(size=(40, 4)) * [0, 0.2, 0.2, 0] + poses[:, 3:7]
+    poses[:, 3:7] = tilt / np.linalg.norm(tilt, axis=1, keepdims=True)
+    blocks = Blocks(np.vstack([BLOCK.rows, [[3.0, 3.0, 0.4, 0.2, 0.5, 0.15]]]))
+    seen = open_eyes(two_rooms, [blocks] * 40, camera, ceiling).look(poses)
+    whole = DepthCamera([floorplan_mesh(two_rooms, blocks, ceiling)], camera)
+    expected = whole.render(np.zeros(40, int), poses[:, :3], matrix_of(np, poses[:, 3:7]))
+    off = (seen - expected).abs().numpy()
+    assert (off > 1e-4).mean() < 1e-4  # a ray along an edge may fall on either side
+    assert expected.min() < 0.5 and seen.max() > 0.8 * camera.far
+
+
 def test_rows_that_ended_keep_their_image_and_do_not_matter(two_rooms: FloorPlan) -> None:
     blocks = [BLOCK, NONE, BLOCK]
     first = np.stack([stand(5.0, 3.0)] * 3)
@@ -71,6 +94,6 @@ def test_rows_that_ended_keep_their_image_and_do_not_matter(two_rooms: FloorPlan
 
 def test_homes_without_clutter_share_a_mesh(two_rooms: FloorPlan, monkeypatch: pytest.MonkeyPatch) -> None:
     built = []
-    monkeypatch.setattr(Eyes, "__init__", lambda self, meshes, worlds, camera: built.append((len(meshes), worlds)))
+    monkeypatch.setattr(Eyes, "__init__", lambda self, meshes, worlds, *_, **__: built.append((len(meshes), worlds)))
     open_eyes(two_rooms, [NONE, BLOCK, NONE, BLOCK], LEVEL)
     assert built == [(3, [0, 1, 0, 2])]

@@ -13,7 +13,12 @@ from vinl.robot.rotation import matrix_of
 from vinl.sensing.depth import DepthCamera, Mesh
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
-from vinl.world.mesh import floorplan_mesh
+from vinl.world.mesh import BOTTOM_TRIANGLES, TOP_TRIANGLES, TRIANGLES_PER_BOX, floorplan_mesh
+
+_ON_FLOOR, _OVER_CAMERA = 0.01, 1.2
+"""A box lower than this stands on the floor; the cameras of a robot of 0.5 m stay below this [m]."""
+
+_FLOOR_TRIANGLES = 2
 
 
 class Eyes:
@@ -23,11 +28,14 @@ class Eyes:
         meshes: the worlds, vertices (v, 3) [m] and faces (f, 3).
         worlds: (n,) the world that each robot is in.
         camera: what each of them carries.
+        floor: height of a level floor that the meshes leave out [m]; None: they have it.
     """
 
-    def __init__(self, meshes: Sequence[Mesh], worlds: Sequence[int], camera: Camera) -> None:
+    def __init__(
+        self, meshes: Sequence[Mesh], worlds: Sequence[int], camera: Camera, floor: float | None = None
+    ) -> None:
         self.camera = camera
-        self._depth = DepthCamera(meshes, camera)
+        self._depth = DepthCamera(meshes, camera, floor=floor)
         self._mount, self._turn = np.array(camera.position), camera.rotation()
         self._worlds = np.asarray(worlds, dtype=np.int32)
         self._images = torch.full((len(worlds), camera.height, camera.width), camera.far)
@@ -81,5 +89,20 @@ def open_eyes(plan: FloorPlan, blocks: Sequence[Blocks], camera: Camera, ceiling
         if not len(some):
             bare = len(meshes)
         worlds.append(len(meshes))
-        meshes.append(floorplan_mesh(plan, some, ceiling))
-    return Eyes(meshes, worlds, camera)
+        meshes.append(seen_mesh(plan, some, ceiling))
+    return Eyes(meshes, worlds, camera, floor=0.0)
+
+
+def seen_mesh(plan: FloorPlan, blocks: Blocks, ceiling: float | None = None) -> Mesh:
+    """What a camera on the robot can see of a home, without its floor.
+
+    Left out: bottoms that lie on the floor, and tops that are higher than any camera gets. Fewer triangles make quicker
+    rays.
+    """
+    vertices, faces = floorplan_mesh(plan, blocks, ceiling)
+    boxes = plan.boxes + blocks.boxes()
+    shown = np.ones((len(boxes), TRIANGLES_PER_BOX), bool)
+    shown[:, BOTTOM_TRIANGLES] = (boxes.rows[:, 5] >= _ON_FLOOR)[:, None]
+    shown[:, TOP_TRIANGLES] = (boxes.rows[:, 6] <= _OVER_CAMERA)[:, None]
+    rest = faces[shown.size :]  # the floor, then the ceiling
+    return vertices, np.concatenate([faces[: shown.size][shown.ravel()], rest[_FLOOR_TRIANGLES:]])
