@@ -135,10 +135,12 @@ def test_navigators_by_name(tmp_path: Path) -> None:
     assert load_policy(folder).camera == navigator.camera
 
 
-def test_last_motion_instead_of_last_action(two_rooms: FloorPlan) -> None:
+@pytest.mark.parametrize("previous", ["motion", "both"])
+def test_last_motion_instead_of_last_action(two_rooms: FloorPlan, previous: str) -> None:
     """What the card says it observes: how far the robot came, whatever it asked for."""
-    network = TinyGuide()
-    card = navigation_card("guide", network.describe(), replace(NAVIGATION_CAMERA, height=8, width=12).describe(), True)
+    network, camera = TinyGuide(), replace(NAVIGATION_CAMERA, height=8, width=12)
+    network.observation_size = 7 if previous == "both" else 5
+    card = navigation_card("guide", network.describe(), camera.describe(), previous)
     navigator = LearnedNavigator(DepthPolicy(network, card))
     task = Task(FreeSpace(two_rooms), sample_start_goals(two_rooms, 1, np.random.default_rng(0), 2.0)[0])
     navigator.reset([task, task])
@@ -149,4 +151,6 @@ def test_last_motion_instead_of_last_action(two_rooms: FloorPlan) -> None:
     np.testing.assert_array_equal(first[0, :, 3:], 0.0)
     # the first stood, the second walked 0.8 m/s and turned by 30 deg/s
     forward = 0.4 * np.cos(np.pi / 24) / np.sinc(1 / 24) / 0.5
-    np.testing.assert_allclose(later[0, :, 3:], [[-1.0, 0.0], [2 * forward - 1, 0.5]], atol=1e-6)
+    np.testing.assert_allclose(later[0, :, -2:], [[-1.0, 0.0], [2 * forward - 1, 0.5]], atol=1e-6)
+    if previous == "both":
+        np.testing.assert_allclose(later[0, :, 3:5], [[0.6, 0.0], [-1.0, 1.0]])

@@ -71,7 +71,7 @@ def test_time_runs_out(config, homes):
     assert measures["episodes"] == 32 and measures["success"] == 0 and measures["steps"] == 5
 
 
-@pytest.mark.parametrize("previous", ["motion", "action"])
+@pytest.mark.parametrize("previous", ["motion", "action", "both"])
 def test_a_cancelled_step_is_seen_unless_the_paper_asks(config, homes, previous):
     """A robot that asks for the same step again and again sees that it stands."""
     environment = NavEnvironment(replace(config, num_envs=300, camera=None, previous=previous), homes)
@@ -81,9 +81,12 @@ def test_a_cancelled_step_is_seen_unless_the_paper_asks(config, homes, previous)
     stopped = (environment.state["in_a_row"] > 0) & ~step.done
     going = (environment.state["in_a_row"] == 0) & ~step.done
     assert stopped.sum() > 50 and going.sum() > 5
-    seen = torch.tensor([-1.0, 0.0] if previous == "motion" else [0.6, 0.2])
-    torch.testing.assert_close(step.vector[stopped, 3:], seen.expand(int(stopped.sum()), 2))
-    torch.testing.assert_close(step.vector[going, 3:], action[going])
+    seen = torch.tensor([-1.0, 0.0] if previous != "action" else [0.6, 0.2])
+    torch.testing.assert_close(step.vector[stopped, -2:], seen.expand(int(stopped.sum()), 2))
+    torch.testing.assert_close(step.vector[going, -2:], action[going])
+    assert step.vector.shape == (300, 7 if previous == "both" else 5)
+    if previous == "both":
+        torch.testing.assert_close(step.vector[~step.done, 3:5], action[~step.done])
     assert (step.vector[step.done, 3:] == 0).all()
 
 

@@ -113,7 +113,9 @@ def test_who_starts_from_a_run_gets_its_critic(tmp_path):
     assert not load_critic(second, tmp_path)  # a policy alone
     save_critic(first, tmp_path)
     assert load_critic(second, tmp_path)
-    assert torch.equal(first.value[0].weight, second.value[0].weight) and second.log_std[0].item() == pytest.approx(-1.2)
+    assert torch.equal(first.value[0].weight, second.value[0].weight) and second.log_std[0].item() == pytest.approx(
+        -1.2
+    )
     wider = build_config(NavConfig, {"num_envs": 4, "camera": None, "network": {"hidden": 16, "layers": 1}})
     assert not load_critic(build_algorithm(wider, "cpu").model, tmp_path)
     (tmp_path / "critic.safetensors").write_bytes(b"broken")

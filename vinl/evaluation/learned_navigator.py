@@ -11,7 +11,7 @@ from jaxtyping import Float
 from vinl.config.errors import InputError
 from vinl.evaluation.navigator import Task
 from vinl.evaluation.odometry import measure_twist
-from vinl.policies.card import FORWARD_SPEED, NAVIGATION_TABLE, YAW_RATE, PolicyCard, observes_motion
+from vinl.policies.card import FORWARD_SPEED, NAVIGATION_TABLE, YAW_RATE, PolicyCard, find_previous
 from vinl.policies.policy import Policy
 from vinl.robot.cameras import Camera
 
@@ -23,7 +23,7 @@ class LearnedNavigator:
 
     A policy whose card lists ``previous_motion`` gets what the robot did since the last decision, from its poses (from
     odometry, on a robot), as in its training (``vinl.policies.card.PREVIOUS_MOTION``): a robot that walks against a
-    wall reads that it stands. One whose card lists ``previous_action`` gets what it asked for.
+    wall reads that it stands. One whose card lists ``previous_action`` gets what it asked for; a card may list both.
 
     Args:
         policy: observes (n, 5): distance / 5 m, cosine and sine of the bearing, and its last step; and depth.
@@ -48,7 +48,7 @@ class LearnedNavigator:
         action = policy.card.action
         low, high = np.array([action.get("forward_speed", FORWARD_SPEED), action.get("yaw_rate", YAW_RATE)]).T
         self._middle, self._half = (high + low) / 2, (high - low) / 2
-        self._period, self._observes_motion = period, observes_motion(policy.card)
+        self._period, self._previous = period, find_previous(policy.card)
         self._last = np.zeros((0, 2), np.float32)
         self._pose: np.ndarray | None = None
 
@@ -66,9 +66,12 @@ class LearnedNavigator:
     def act(self, observation: dict[str, Any]) -> Float[np.ndarray, "n 2"]:
         """See ``Navigator.act``; reads ``goal``, ``depth`` and, to see how far the robot came, ``pose``."""
         goal = np.asarray(observation["goal"], np.float32) * np.array([_DISTANCE_SCALE, 1.0, 1.0], np.float32)
-        if self._observes_motion:
-            self._last = self._measure(np.asarray(observation["pose"], np.float64))
-        vector = np.concatenate([goal, self._last], 1)
+        parts = [goal]
+        if self._previous != "motion":
+            parts.append(self._last)
+        if self._previous != "action":
+            parts.append(self._measure(np.asarray(observation["pose"], np.float64)))
+        vector = np.concatenate(parts, 1)
         action = self.policy.act(vector) if self.camera is None else self.policy.act(vector, observation["depth"])
         self._last = np.clip(np.asarray(action, np.float32), -1.0, 1.0)
         return self._middle + self._half * self._last.astype(np.float64)

@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 
 from vinl.config.errors import InputError
 from vinl.nav.ppo_config import NetworkConfig, PpoConfig
+from vinl.policies.card import PREVIOUS
 from vinl.robot.cameras import Camera
 from vinl.world.homes.config import HomeConfig
 
 Range = tuple[float, float]
 Pair = tuple[float, float]
-
-PREVIOUS = ("action", "motion")
 
 
 def _check_range(name: str, value: Range, least: float = -math.inf, most: float = math.inf) -> None:
@@ -319,15 +318,15 @@ class NavConfig:
         num_envs: robots in parallel; on each device, where there are several.
         iterations: updates of a training.
         seed: of everything random but the homes.
-        previous: what a robot knows of its last step: ``action`` that it asked for [paper], or its ``motion`` in the
-            same units, (-1, 0) where the step was cancelled.
+        previous: what a robot knows of its last step: the ``action`` that it asked for [paper], its ``motion`` in the
+            same units, (-1, 0) where the step was cancelled, or ``both``.
         camera: null: the robot is blind.
     """
 
     num_envs: int = 4096
     iterations: int = 1000
     seed: int = 1
-    previous: str = "motion"
+    previous: str = "both"
     homes: HomesConfig = field(default_factory=HomesConfig)
     episodes: EpisodeConfig = field(default_factory=EpisodeConfig)
     robot: RobotConfig = field(default_factory=RobotConfig)

@@ -45,14 +45,15 @@ class NavStep(NamedTuple):
     Attributes:
         depth: (n, H, W) float16 in [0, 1]; of the new episode where done. (n, 0, 0) if the robots are blind.
         vector: (n, 5) float32: distance to the goal / 5 m, cosine and sine of its bearing (left is positive), and the
-            previous action or motion (``NavConfig.previous``), 0 at the start; of the new episode where done.
+            previous action or motion, 0 at the start; (n, 7) with both (``NavConfig.previous``). Of the new episode
+            where done.
         reward: (n,) float32.
         done: (n,) bool, an episode ended with this step.
         timeout: (n,) bool, it ended for want of time (or because its home was replaced), not at the goal.
     """
 
     depth: Float[Tensor, "n height width"]
-    vector: Float[Tensor, "n 5"]
+    vector: Float[Tensor, "n k"]
     reward: Float[Tensor, " n"]
     done: Bool[Tensor, " n"]
     timeout: Bool[Tensor, " n"]
@@ -123,7 +124,7 @@ class NavEnvironment:
 
     # ---- what a training calls ------------------------------------------------------------------------------------
 
-    def observe(self) -> tuple[Float[Tensor, "n height width"], Float[Tensor, "n 5"]]:
+    def observe(self) -> tuple[Float[Tensor, "n height width"], Float[Tensor, "n k"]]:
         """Depth and vector of the present state, as in ``NavStep``; the same until the next step."""
         if self._observation is None:
             self._observation = self._look()
@@ -291,6 +292,7 @@ class NavEnvironment:
         )
         for name in ("steps", "path", "collisions", "in_a_row"):
             state[name].masked_fill_(chosen, 0.0)
+        state["action"].masked_fill_(chosen[:, None], 0.0)
         state["start_distance"].copy_(torch.where(chosen, state["distance"], state["start_distance"]))
         self._observation = None
 
@@ -299,7 +301,10 @@ class NavEnvironment:
         to_goal = self.goals() - state["position"]
         bearing = torch.atan2(to_goal[:, 1], to_goal[:, 0]) - state["yaw"]
         distance = torch.linalg.vector_norm(to_goal, dim=1) / DISTANCE_UNIT
-        vector = torch.cat([torch.stack([distance, bearing.cos(), bearing.sin()], 1), state["previous"]], 1)
+        last = [state["previous"]]
+        if self.config.previous == "both":
+            last.insert(0, state["action"])
+        vector = torch.cat([torch.stack([distance, bearing.cos(), bearing.sin()], 1), *last], 1)
         if self.camera is None:
             return torch.zeros(n, 0, 0, dtype=torch.float16, device=self.device), vector
         depth = torch.empty(n, self.camera.height, self.camera.width, dtype=torch.float16, device=self.device)

@@ -19,7 +19,7 @@ from vinl.nav.environment import NavEnvironment
 from vinl.nav.follower import PathFollower
 from vinl.nav.home_store import HomeStore
 from vinl.nav.measures import EpisodeEnd
-from vinl.policies.card import PolicyCard, observes_motion
+from vinl.policies.card import PolicyCard, find_previous
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.world.readers import expand_paths, shipped_floorplans
@@ -197,7 +197,7 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
         config,
         num_envs=rules.episodes,
         seed=rules.seed,
-        previous="motion" if card is not None and observes_motion(card) else "action",
+        previous="action" if card is None else find_previous(card),
         camera=camera,
         episodes=episodes,
         homes=homes,

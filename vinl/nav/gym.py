@@ -187,7 +187,9 @@ def _build(
 
 def _describe_spaces(environment: NavEnvironment) -> tuple[Any, Any]:
     """Observation and action space of one robot."""
-    low, high = np.array([0, -1, -1, -1, -1], np.float32), np.array([_FARTHEST, 1, 1, 1, 1], np.float32)
+    size = environment.observe()[1].shape[1]
+    low, high = np.full(size, -1, np.float32), np.ones(size, np.float32)
+    low[0], high[0] = 0, _FARTHEST
     parts: dict[str, spaces.Space[Any]] = {"vector": spaces.Box(low, high, dtype=np.float32)}
     if environment.camera is not None:
         parts["depth"] = spaces.Box(0.0, 1.0, (environment.camera.height, environment.camera.width), np.float32)
@@ -197,7 +199,7 @@ def _describe_spaces(environment: NavEnvironment) -> tuple[Any, Any]:
 def _observation(environment: NavEnvironment) -> dict[str, np.ndarray]:
     depth, vector = environment.observe()
     seen = vector.cpu().numpy()
-    seen = seen.clip(-1.0, [_FARTHEST, 1.0, 1.0, 1.0, 1.0]).astype(np.float32)  # a cosine may be 1 + 1e-7
+    seen = np.hstack([seen[:, :1].clip(0, _FARTHEST), seen[:, 1:].clip(-1, 1)])  # a cosine may be 1 + 1e-7
     parts = {"vector": seen}
     if environment.camera is not None:
         parts["depth"] = depth.float().cpu().numpy()

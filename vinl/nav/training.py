@@ -22,7 +22,7 @@ from vinl.nav.home_store import HomeStore
 from vinl.policies.card import PolicyCard, navigation_card
 from vinl.policies.commit import find_commit
 from vinl.policies.io import load_policy, save_policy
-from vinl.policies.nav_actor import ACTION_SIZE, OBSERVATION_SIZE, NavActor
+from vinl.policies.nav_actor import ACTION_SIZE, PREVIOUS_SIZE, NavActor
 from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers, join_peers
 from vinl.rl.peer_loop import PeerLoop, peer_folder
@@ -245,6 +245,7 @@ def build_actor(config: NavConfig) -> NavActor:
         layers=n.layers,
         memory=n.memory,
         planes=n.planes,
+        previous=PREVIOUS_SIZE * (2 if config.previous == "both" else 1),
     )
 
 
@@ -271,7 +272,7 @@ def build_algorithm(
         config.num_envs,
         actor.image,
         p.image_type,
-        OBSERVATION_SIZE,
+        actor.observation_size,
         int(config.network.privileged),
         ACTION_SIZE,
         actor.initial_state(config.num_envs, device),
@@ -358,7 +359,7 @@ def make_card(
         name,
         network,
         camera,
-        config.previous == "motion",
+        config.previous,
         training=training,
         seed=config.seed,
         samples=samples,

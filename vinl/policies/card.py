@@ -73,9 +73,9 @@ NAVIGATION_TABLE: tuple[dict[str, Any], ...] = (
 positive), and its last action, held to [-1, 1], zero when an episode begins."""
 
 PREVIOUS_MOTION: dict[str, Any] = {"name": "previous_motion", "size": 2, "scale": [1.0], "unit": "1"}
-"""What a navigator may observe in the place of its last action: how the robot moved meanwhile, as the action that asks
-for just that: (2 x mean forward speed / (1 m/s) - 1, mean yaw rate / (60 deg/s)), held to [-1, 1]; (-1, 0) is a robot
-that stood or was stopped. Zero when an episode begins."""
+"""What a navigator may observe in the place of its last action, or behind it: how the robot moved meanwhile, as the
+action that asks for just that: (2 x mean forward speed / (1 m/s) - 1, mean yaw rate / (60 deg/s)), held to [-1, 1];
+(-1, 0) is a robot that stood or was stopped. Zero when an episode begins."""
 
 FORWARD_SPEED = (0.0, 1.0)
 """Forward speed at the actions -1 and 1 [m/s] [paper]."""
@@ -104,23 +104,33 @@ def locomotion_card(
     return PolicyCard("locomotion", name, network, table, action or describe_action(), **rest)
 
 
-def navigation_table(motion: bool = False) -> list[dict[str, Any]]:
-    """What a navigator observes; ``motion``: with ``PREVIOUS_MOTION`` in the place of the last action."""
-    return [dict(row) for row in (*NAVIGATION_TABLE[:2], PREVIOUS_MOTION if motion else NAVIGATION_TABLE[2])]
+PREVIOUS = ("action", "motion", "both")
+"""What a navigator may know of its last step."""
 
 
-def observes_motion(card: PolicyCard) -> bool:
-    """Whether a navigator observes how the robot moved, instead of its last action."""
-    return any(row.get("name") == PREVIOUS_MOTION["name"] for row in card.observation)
+def navigation_table(previous: str = "action") -> list[dict[str, Any]]:
+    """What a navigator observes: the goal, and of its last step the action, the motion (``PREVIOUS_MOTION``) or both,
+    the action first."""
+    goal, action = NAVIGATION_TABLE[:2], NAVIGATION_TABLE[2]
+    last = {"action": (action,), "motion": (PREVIOUS_MOTION,), "both": (action, PREVIOUS_MOTION)}[previous]
+    return [dict(row) for row in (*goal, *last)]
+
+
+def find_previous(card: PolicyCard) -> str:
+    """What a navigator's card lists of its last step: one of ``PREVIOUS``."""
+    names = {row.get("name") for row in card.observation}
+    if PREVIOUS_MOTION["name"] not in names:
+        return "action"
+    return "both" if NAVIGATION_TABLE[2]["name"] in names else "motion"
 
 
 def navigation_card(
-    name: str, network: dict[str, Any], camera: dict[str, Any] | None, motion: bool = False, **rest: Any
+    name: str, network: dict[str, Any], camera: dict[str, Any] | None, previous: str = "action", **rest: Any
 ) -> PolicyCard:
-    """A navigation card with the table and the action scaling that ``NavActor`` has; ``motion`` as for
+    """A navigation card with the table and the action scaling that ``NavActor`` has; ``previous`` as for
     ``navigation_table``, ``rest`` are further fields."""
     action = {"forward_speed": list(FORWARD_SPEED), "yaw_rate": list(YAW_RATE)}
-    return PolicyCard("navigation", name, network, navigation_table(motion), action, camera, **rest)
+    return PolicyCard("navigation", name, network, navigation_table(previous), action, camera, **rest)
 
 
 def write_card(folder: Path, card: PolicyCard) -> None:

@@ -14,7 +14,7 @@ from torch import Tensor
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.config.paths import assets_dir
-from vinl.policies.card import CARD_FILE, PolicyCard, navigation_table, observes_motion, read_card, write_card
+from vinl.policies.card import CARD_FILE, PolicyCard, find_previous, navigation_table, read_card, write_card
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.device import choose_device
 from vinl.policies.networks import PolicyNetwork, build_network
@@ -130,7 +130,7 @@ def _refuse_foreign_folder(folder: Path) -> None:
 def _check_against_robot(card: PolicyCard, folder: Path, network: PolicyNetwork, sees: bool) -> None:
     """A policy must have been trained on what this version lets it observe, and move what this robot moves."""
     if card.kind == "navigation":
-        wanted, actions = navigation_table(observes_motion(card)), 2
+        wanted, actions = navigation_table(find_previous(card)), 2
     else:
         wanted, actions = describe(), 12
         if network.observation_size == PROPRIOCEPTION_SIZE:  # what sees needs no height scan

@@ -32,6 +32,7 @@ class NavActor(PolicyNetwork):
         hidden, layers: of the memory.
         memory: ``"lstm"`` or ``"mlp"``.
         planes: channels of the ResNet's first stage.
+        previous: numbers on the last step: 2 of the action or the motion, 4 of both.
 
     Attributes:
         image: (height, width) [pixels], or None if blind.
@@ -52,8 +53,10 @@ class NavActor(PolicyNetwork):
         layers: int = 2,
         memory: str = "lstm",
         planes: int = 32,
+        previous: int = PREVIOUS_SIZE,
     ) -> None:
         super().__init__()
+        self.observation_size = GOAL_SIZE + previous
         self.arguments = {
             "vision": vision,
             "height": height,
@@ -64,9 +67,10 @@ class NavActor(PolicyNetwork):
             "layers": layers,
             "memory": memory,
             "planes": planes,
+            "previous": previous,
         }
         self.goal = nn.Linear(GOAL_SIZE, embedding)
-        self.previous = nn.Linear(PREVIOUS_SIZE, embedding)
+        self.previous = nn.Linear(previous, embedding)
         self.memory = DepthMemory(vision, height, width, 2 * embedding, visual, hidden, layers, memory, planes)
         self.image, self.feature_size = self.memory.image, hidden
         self.mean = nn.Linear(hidden, ACTION_SIZE)
@@ -80,7 +84,7 @@ class NavActor(PolicyNetwork):
     def forward(
         self,
         depth: Float[Tensor, "t n height width"] | None,
-        vector: Float[Tensor, "t n 5"],
+        vector: Float[Tensor, "t n k"],
         state: State,
         fresh: Bool[Tensor, "t n"],
     ) -> tuple[Float[Tensor, "t n 2"], State]:
@@ -88,7 +92,8 @@ class NavActor(PolicyNetwork):
 
         Args:
             depth: (t, n, H, W) in [0, 1]; not looked at when blind.
-            vector: (t, n, 5): distance to the goal / 5 m, cosine and sine of its bearing, previous action.
+            vector: (t, n, k): distance to the goal / 5 m, cosine and sine of its bearing, previous action or motion or
+                both.
             state: before the first step.
             fresh: (t, n) an episode begins with this step: its state is zeroed before it.
 
@@ -101,7 +106,7 @@ class NavActor(PolicyNetwork):
     def look(
         self,
         depth: Float[Tensor, "t n height width"] | None,
-        vector: Float[Tensor, "t n 5"],
+        vector: Float[Tensor, "t n k"],
         state: State,
         fresh: Bool[Tensor, "t n"],
     ) -> tuple[Float[Tensor, "t n hidden"], State]:
