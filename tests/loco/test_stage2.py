@@ -18,7 +18,7 @@ from vinl.config.loader import dump_config, load_config
 from vinl.loco import training
 from vinl.loco.config import CurriculumConfig, LocoConfig
 from vinl.loco.curriculum import next_levels
-from vinl.loco.environment import LocoEnvironment
+from vinl.loco.environment import LocoEnvironment, tile_cover
 from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import locomotion_card
 from vinl.policies.io import find_policy, load_policy, save_policy
@@ -27,7 +27,7 @@ from vinl.rl.models import BlindModel
 from vinl.robot.aliengo import FOOT_GEOMS, home_qpos
 from vinl.robot.model import robot_spec
 from vinl.robot.observation import OBSERVATION_SIZE
-from vinl.world.terrain import build_terrain
+from vinl.world.terrain import TILE, build_terrain
 
 SMALL = [
     "num_envs=16",
@@ -215,3 +215,23 @@ def test_starts_are_clear_of_blocks_and_walls(config):
     for start in ground.starts.reshape(-1, 3):
         assert np.abs(corners - start[:2]).max(1).min() > free
     assert {"walls", "blocks", "rough_slope"} <= set(ground.kinds)
+
+
+def test_the_environment_knows_who_walks_over_blocks(env):
+    rows = env.terrain.blocks.rows
+    over = np.asarray(env.simulation.over_block(env.simulation.ground, jnp.asarray(rows[:, :2], jnp.float32)))
+    assert (
+        over.all() and not np.asarray(env.simulation.over_block(env.simulation.ground, jnp.zeros((1, 2)) + 1e3)).any()
+    )
+    cover = tile_cover(env.terrain)
+    assert cover.shape == env.terrain.starts.shape[:2] and (cover[0] == 0).all()
+    assert cover.sum() * TILE**2 == pytest.approx((rows[:, 3] * rows[:, 4]).sum(), rel=0.25)
+    start = jax.jit(env._first_state)(jax.random.PRNGKey(0))
+    level = int(np.argmax(cover[:, 0]))
+    qpos = start.body.qpos.at[:, :2].set(jnp.asarray(rows[0, :2], jnp.float32)).at[:, 2].set(1.0)
+    state = start._replace(body=start.body._replace(qpos=qpos), level=start.level * 0 + level, column=start.column * 0)
+    env.state = jax.device_put(state, jax.devices()[0])
+    env.read_measures()
+    env.step(jnp.zeros((env.num_envs, 12)))
+    expected = 1 / cover[level, 0] if cover[level, 0] * env.num_envs > 1 else env.num_envs
+    assert env.read_measures()["trunk_over_blocks"] == pytest.approx(expected, rel=1e-3)

@@ -96,6 +96,27 @@ def test_it_trains_and_a_resumed_run_ends_with_the_very_same_weights(tmp_path, c
     assert [row["iteration"] for row in read_rows(stopped)] == [1, 2, 3]
 
 
+def test_a_robot_that_goes_wrong_is_set_back_and_saved(tmp_path, compiled_once, monkeypatch):
+    step, count = LocoEnvironment.step, 0
+
+    def spoiled(self, action):
+        nonlocal count
+        count += 1
+        if count == 6:  # in the second iteration of four steps
+            body = self.state.body
+            body = body._replace(qvel=body.qvel.at[3, 8].set(1e9))
+            self.state = jax.device_put(self.state._replace(body=body), jax.devices()[0])
+        return step(self, action)
+
+    monkeypatch.setattr(LocoEnvironment, "step", spoiled)
+    command = ["train-loco", "--stage", "3", "--device", "cpu", "--from", "vinl/rough", *SMALL]
+    assert main([*command, "--out", str(tmp_path / "run")]) == 0
+    rows = read_rows(tmp_path / "run")
+    assert [row["not_finite"] for row in rows] == [0, 1, 0]
+    assert all(np.isfinite(list(row.values())).all() for row in rows)
+    assert [file.name for file in (tmp_path / "run" / "not_finite").iterdir()] == ["000001.npz"]
+
+
 def test_policies_that_cannot_teach_are_refused(tmp_path, capsys):
     blind, student = tmp_path / "blind", tmp_path / "student"
     network = BlindActor(actor=(8,))

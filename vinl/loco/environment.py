@@ -21,7 +21,8 @@ from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
 from vinl.robot.observation import CLIP, NOISE, OBSERVATION_SIZE, observe
 from vinl.robot.rotation import rotate_inverse
 from vinl.sensing.height_scan import scan_ground
-from vinl.world.terrain import build_terrain
+from vinl.world.heightfield import BLOCK
+from vinl.world.terrain import RESOLUTION, TILE, Terrain, build_terrain
 
 _EDGE = 2.0
 """An episode ends as by time this near to the edge of the terrain [m]."""
@@ -52,6 +53,8 @@ MEASURES = (
     "foot_block",
     "shank_block",
     "foot_wall",
+    "over_block",
+    "covered",
     "not_finite",
     "level",
     "clipped",
@@ -137,6 +140,8 @@ class LocoEnvironment:
         device = jax.devices()[0]
         self._starts = jax.device_put(jnp.asarray(self.terrain.starts, jnp.float32), device)
         frame = self.simulation.frame
+        cover = tile_cover(self.terrain) if len(self.terrain.blocks) else np.zeros(self.terrain.starts.shape[:2])
+        self._cover = jax.device_put(jnp.asarray(cover, jnp.float32), device)
         self._edge = np.array([-frame.x0, -frame.y0]) - _EDGE
         self.set_rewards(config.rewards)
         self._step = jax.jit(self._advance, donate_argnums=(1, 2))
@@ -187,6 +192,7 @@ class LocoEnvironment:
             "foot_block_per_m": raw["foot_block"] / metres,
             "shank_block_per_m": raw["shank_block"] / metres,
             "foot_wall_per_m": raw["foot_wall"] / metres,
+            "trunk_over_blocks": raw["over_block"] / max(raw["covered"], 1.0),
             "clipped": raw["clipped"] / steps,
             "not_finite": raw["not_finite"],
             **{name: value / steps / CONTROL_DT for name, value in raw.items() if name.startswith("reward/")},
@@ -321,7 +327,9 @@ class LocoEnvironment:
             hits,
         )
         moved = jnp.linalg.norm(body.qpos[:, :2] - old.body.qpos[:, :2], axis=1)
-        sums = self._measure(motion, old.level, reward, weighted, clipped, moved, timeout, life, broken)
+        over = self.simulation.over_block(ground, body.qpos[:, :2])
+        cover = self._cover[old.level, old.column]
+        sums = self._measure(motion, old.level, reward, weighted, clipped, moved, timeout, life, broken, over, cover)
 
         # pushes, new starts, new commands
         push = old.push_left <= 0
@@ -391,7 +399,7 @@ class LocoEnvironment:
 
     def _measure(
         self, m: Motion, level: Array, reward: Array, weighted: dict[str, Array], clipped: Array, moved: Array,
-        timeout: Array, life: Array, broken: Array,
+        timeout: Array, life: Array, broken: Array, over: Array, cover: Array,
     ) -> Float[Array, " m"]:  # fmt: skip
         """Sums over robots in the order of ``MEASURES``, then the weighted reward terms."""
         linear2 = jnp.sum((m.command[:, :2] - m.linear[:, :2]) ** 2, 1)
@@ -410,12 +418,23 @@ class LocoEnvironment:
             "foot_block": m.contacts.foot_block.any(1),
             "shank_block": m.contacts.shank_block.any(1),
             "foot_wall": m.contacts.foot_wall.any(1),
+            "over_block": over,
+            "covered": cover,
             "not_finite": broken,
             "level": level,
             "clipped": clipped,
         }
         ordered = [values[name] for name in MEASURES] + [weighted[name] for name in TERMS]
         return jnp.stack([jnp.sum(jnp.nan_to_num(value), dtype=jnp.float32) for value in ordered])
+
+
+def tile_cover(terrain: Terrain) -> Float[np.ndarray, "levels columns"]:
+    """The share of every tile that blocks cover."""
+    covered, half = np.zeros(terrain.starts.shape[:2], np.float32), round(TILE / RESOLUTION / 2)
+    for k, c in np.ndindex(covered.shape):
+        i, j = terrain.ground.frame.cell(terrain.starts[k, c, :2])
+        covered[k, c] = (terrain.ground.labels[i - half : i + half, j - half : j + half] == BLOCK).mean()
+    return covered
 
 
 def _strong(state: State) -> State:

@@ -163,6 +163,12 @@ class Simulation:
         i = jnp.clip(jnp.round((xy[..., 1] - f.y0) / f.resolution), 0, f.shape[0] - 1).astype(jnp.int32)
         return i * f.shape[1] + j
 
+    def over_block(self, ground: Ground, xy: Float[Array, "*n 2"]) -> Bool[Array, "*n"]:
+        """Whether points [m] lie above a block, to half a cell."""
+        if not self._has_blocks:
+            return jnp.zeros(xy.shape[:-1], bool)
+        return ground.distance[self.cell(xy)] < 0
+
     def step(
         self, ground: Ground, body: Body, target: Float[Array, "n 12"], friction: Array, added_mass: Array
     ) -> tuple[Body, Contacts, Float[Array, "n 12"]]:

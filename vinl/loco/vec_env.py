@@ -79,6 +79,10 @@ class LocoVecEnv(VecEnv):
         """
         leaves, shape = jax.tree.flatten(self.environment.state)
         saved = [x.numpy().astype(leaf.dtype) for x, leaf in zip(state["leaves"], leaves, strict=True)]
+        if (
+            saved[-1].shape != leaves[-1].shape
+        ):  # sums since they were last read: a version with other measures wrote it
+            saved[-1] = np.zeros(leaves[-1].shape, leaves[-1].dtype)
         if [x.shape for x in saved] != [leaf.shape for leaf in leaves]:
             raise ValueError(f"it holds {len(saved[1])} robots, this run has {self.num_envs}")
         self.environment.state = jax.device_put(jax.tree.unflatten(shape, saved), jax.devices()[0])
