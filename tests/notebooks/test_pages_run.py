@@ -1,0 +1,49 @@
+"""README and how-to pages: their Python runs, their links lead somewhere, all public names are documented."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import vinl
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+TAUGHT = [page for page in PAGES if page.stem in ("README", "gymnasium") or page.stem.startswith("howto_")]
+SLOW = {"howto_train"}  # its Python trains a navigator
+
+
+def find_code(page: Path) -> list[str]:
+    return re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+
+
+@pytest.mark.parametrize(
+    "page", [pytest.param(p, marks=[pytest.mark.slow] if p.stem in SLOW else []) for p in TAUGHT], ids=lambda p: p.stem
+)
+def test_python_on_the_page_runs(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    names: dict = {"__name__": "page"}
+    for number, code in enumerate(find_code(page)):
+        exec(compile(code, f"{page.name}[{number}]", "exec"), names)
+    assert find_code(page)
+    if page.stem == "README":
+        assert "success 7.0 m" in capsys.readouterr().out and Path("way.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_links_lead_somewhere(page: Path) -> None:
+    links = re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text())
+    missing = [link for link in links if "://" not in link and not (page.parent / link).exists()]
+    assert not missing
+
+
+def test_index_leads_to_every_page() -> None:
+    index = (ROOT / "docs" / "index.md").read_text()
+    assert not [page.name for page in PAGES[1:] if page.stem != "index" and f"({page.name})" not in index]
+    assert not [book.name for book in (ROOT / "notebooks").glob("*.ipynb") if f"{book.name})" not in index]
+
+
+def test_public_names_are_documented() -> None:
+    page = (ROOT / "docs" / "api.md").read_text()
+    assert not [name for name in vinl.__all__ if not re.search(rf"`{name}\b", page)]
+    for name in re.findall(r"^\| `(\w+)\(", page, re.MULTILINE):
+        assert name in vinl.__all__
