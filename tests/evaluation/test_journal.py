@@ -62,6 +62,24 @@ def test_fresh_begins_anew(folder: Path, two_rooms: FloorPlan, trotting: Locomot
     assert read_about(folder)["config"]["evaluation"]["time_limit"] == 0.2
 
 
+def test_an_episode_is_walked_again_for_its_film(
+    folder: Path, two_rooms: FloorPlan, trotting: LocomotionPolicy
+) -> None:
+    """Poses are not kept; the episode comes out as before, and its line stays."""
+    row = Row(trotting, load_navigator("oracle", CONFIG), "paper")
+    protocol = Protocol([two_rooms], 2, range(2), CONFIG, films="first")
+    before, kept = list(read_episodes(folder)), (folder / EPISODES).read_bytes()
+    told: list[tuple[str, int, int]] = []
+    for walked in (1, 0):
+        results = evaluate_rows([row], protocol, 1, [folder], keep=True, on_progress=lambda *x: told.append(x))[0]
+        assert results.videos == ["two_rooms_episode0_seed0.mp4"] and (folder / results.videos[0]).exists()
+        assert next(x for x in told if x[0] == "walk") == ("walk", 4 - walked, 4)
+        assert (folder / EPISODES).read_bytes().count(b"record") == 4
+        assert results.records[0] == before[0].record
+        told.clear()
+    assert (folder / EPISODES).read_bytes().startswith(kept)
+
+
 def test_another_evaluation_is_refused(
     folder: Path, two_rooms: FloorPlan, trotting: LocomotionPolicy, standing: LocomotionPolicy
 ) -> None:
