@@ -22,6 +22,8 @@ from vinl.nav.measures import EpisodeEnd
 from vinl.policies.card import PolicyCard, find_previous
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
+from vinl.world.endings import END_REASONS as ALL_REASONS
+from vinl.world.endings import FALL, LOOPING, STUCK, SUCCESS, TIMEOUT
 from vinl.world.readers import expand_paths, shipped_floorplans
 
 MOTIONS = {
@@ -34,8 +36,8 @@ MOTIONS = {
 ground, not at all, or redrawn at each step [paper]."""
 
 ORACLE = "oracle"
-END_REASONS = ("success", "stuck", "looping", "timeout")
-"""How an episode ends. ``stuck`` and ``looping`` are time-outs of which one knows more."""
+END_REASONS = tuple(reason for reason in ALL_REASONS if reason != FALL)
+"""How an episode ends; nothing falls here."""
 
 _CHECK_EVERY = 25
 
@@ -348,5 +350,5 @@ def _pick(chosen: torch.Tensor) -> Callable[[torch.Tensor, torch.Tensor], torch.
 
 def _reason(ended: dict[str, np.ndarray], k: int) -> str:
     if ended["success"][k]:
-        return "success"
-    return "stuck" if ended["stuck"][k] else "looping" if ended["looping"][k] else "timeout"
+        return SUCCESS
+    return STUCK if ended["stuck"][k] else LOOPING if ended["looping"][k] else TIMEOUT
