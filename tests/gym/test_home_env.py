@@ -14,6 +14,7 @@ from gymnasium.utils.env_checker import check_env
 import vinl
 import vinl.gym
 from vinl.config.errors import InputError
+from vinl.config.loader import load_config
 from vinl.evaluation.batches import batch_policy
 from vinl.evaluation.config import EvaluationConfig
 from vinl.evaluation.oracle import OracleNavigator
@@ -21,6 +22,8 @@ from vinl.evaluation.records import plain_record
 from vinl.evaluation.senses import Senses
 from vinl.gym.actions import JOINT_REACH, action_of, velocity_of
 from vinl.gym.home import HomeEnv
+from vinl.nav.config import NavConfig
+from vinl.policies.card import navigation_table
 from vinl.policies.policy import LocomotionPolicy
 from vinl.robot.aliengo import ACTION_SCALE
 from vinl.robot.observation import observe
@@ -57,7 +60,11 @@ def test_passes_the_checker(options: dict) -> None:
 def test_spaces_are_those_of_the_navigator_or_of_the_legs() -> None:
     env = gymnasium.make(ID, floorplans=PLAN).unwrapped
     assert isinstance(env, HomeEnv)
-    assert {name: space.shape for name, space in env.observation_space.items()} == {"vector": (5,), "depth": (60, 80)}
+    nav = load_config(NavConfig, "nav/default")
+    assert nav.camera is not None
+    known = sum(row["size"] for row in navigation_table(nav.previous))
+    sizes = {"vector": (known,), "depth": (nav.camera.height, nav.camera.width)}
+    assert {name: space.shape for name, space in env.observation_space.items()} == sizes
     assert env.action_space.shape == (2,) and env.metadata["render_fps"] == 2
     legs = HomeEnv(floorplans=PLAN, control="joints")
     sizes = {"goal": (3,), "proprioception": (48,), "depth": (36, 64)}
@@ -158,13 +165,16 @@ def test_what_an_agent_observes_is_what_the_table_says() -> None:
 
 def test_navigator_reads_how_the_robot_moved_or_what_it_asked_for() -> None:
     action = np.array([0.5, 0.8], np.float32)
-    for previous, tolerance in (("action", 0.0), ("motion", 0.25)):
+    seen = {}
+    for previous in ("action", "motion", "both"):
         env = HomeEnv(floorplans=PLAN, obstacles="none", cameras={}, overrides=[f"previous={previous}"])
         assert not env.reset(seed=0)[0]["vector"][3:].any()
         env.step(action)
-        seen = env.step(action)[0]["vector"][3:]
-        np.testing.assert_allclose(seen, action, atol=tolerance)
-        assert np.array_equal(seen, action) == (previous == "action")
+        seen[previous] = env.step(action)[0]["vector"][3:]
+    np.testing.assert_array_equal(seen["action"], action)
+    np.testing.assert_allclose(seen["motion"], action, atol=0.25)
+    np.testing.assert_array_equal(seen["both"], [*seen["action"], *seen["motion"]])
+    assert (seen["motion"] != action).all()
 
 
 def test_fall_and_time_limit() -> None:
@@ -185,7 +195,7 @@ def test_fall_and_time_limit() -> None:
 def test_several_at_once() -> None:
     envs = gymnasium.make_vec(ID, 2, "sync", floorplans=PLAN, cameras={})
     observation, _ = envs.reset(seed=5)
-    assert observation["vector"].shape == (2, 5) and not np.array_equal(*observation["vector"])
+    assert observation["vector"].shape[0] == 2 and not np.array_equal(*observation["vector"])
     _, reward, *_ = envs.step(np.zeros((2, 2), np.float32))
     assert reward.shape == (2,)
     envs.close()

@@ -26,6 +26,7 @@ from vinl.gym.drivers import Guide, Legs
 from vinl.gym.senses import AgentSenses, Cameras, choose_cameras
 from vinl.gym.trip import Trip
 from vinl.nav.config import NavConfig
+from vinl.policies.card import navigation_table
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT
 from vinl.world.clutter import CLUTTER
@@ -42,9 +43,9 @@ class HomeEnv(gymnasium.Env):
     """One robot in homes with clutter. The agent is its navigator, or its legs.
 
     ``control="velocity"``: an action (2,) in [-1, 1] is a forward speed of 0 to 1 m/s and a yaw rate of +-60 deg/s that
-    a locomotor carries out for 0.5 s. Observed are ``vector`` (5,), distance / 5 m, cosine and sine of the goal's
-    bearing and the last step (how the robot moved, in units of the action; or the action, by ``previous`` in the
-    config), and ``depth`` of the navigation camera: what ``vinl/Nav-v0`` has.
+    a locomotor carries out for 0.5 s. Observed are ``vector``, distance / 5 m, cosine and sine of the goal's bearing
+    and the last step (by ``previous`` in the config the action, how the robot moved in units of the action, or both),
+    and ``depth`` of the navigation camera: what ``vinl/Nav-v0`` has.
 
     ``control="joints"``: an action (12,) in [-1, 1] x ``joint_reach`` rad is where the joints shall be relative to the
     default pose, for 0.02 s. Observed are ``goal`` (3,), as above, ``proprioception`` (48,), the locomotor's table
@@ -111,7 +112,7 @@ class HomeEnv(gymnasium.Env):
         self._rules = rules if isinstance(rules, EvaluationConfig) else load_config(EvaluationConfig, rules)
         navigation = load_config(NavConfig, config, overrides)
         self._reward, self._clutter = navigation.reward, CLUTTER[obstacles]
-        self._sees_motion = navigation.previous == "motion"
+        self._knows = navigation.previous
         self._spaces = [FreeSpace(plan) for plan in _load_plans(floorplans)]
         self._legs = self._guide = None
         if self._joints:
@@ -123,7 +124,9 @@ class HomeEnv(gymnasium.Env):
                 raise InputError('control="velocity": the agent is the navigator; give none')
             self._legs = Legs(choose_locomotor(locomotor))
         camera = None if navigation.camera is None else navigation.camera.record()
-        self._senses = AgentSenses(self._joints, choose_cameras(cameras, self._joints, camera), height_scan)
+        chosen = choose_cameras(cameras, self._joints, camera)
+        self._steps = 12 if self._joints else sum(row["size"] for row in navigation_table(self._knows)[2:])
+        self._senses = AgentSenses(self._joints, chosen, height_scan, self._steps)
         self.observation_space = self._senses.space
         self.action_space = spaces.Box(-1.0, 1.0, (12 if self._joints else 2,), np.float32)
         rate = 1 / CONTROL_DT / (1 if self._joints else self._rules.navigation_period)
@@ -147,7 +150,7 @@ class HomeEnv(gymnasium.Env):
         gains = self._legs.gains if self._legs else ()
         self.trip = trip = Trip(space, setup, self._rules, *gains)
         self._command, self._view = np.zeros((1, 3)), None
-        self._previous = np.zeros((1, 12 if self._joints else 2), np.float32)
+        self._previous = np.zeros((1, self._steps), np.float32)
         self._senses.enter(trip, self._rules.ceiling)
         for driver in (self._legs, self._guide):
             if driver is not None:
@@ -220,10 +223,9 @@ class HomeEnv(gymnasium.Env):
             touched = touched or trip.touched_wall
             if trip.end:
                 break
-        self._previous = action[None]
-        if self._sees_motion:
-            twist = measure_twist(before, trip.pose, (trip.steps - began) * CONTROL_DT)
-            self._previous = action_of(twist[:, [0, 2]])
+        twist = measure_twist(before, trip.pose, (trip.steps - began) * CONTROL_DT)[:, [0, 2]]
+        known = {"action": [action[None]], "motion": [action_of(twist)], "both": [action[None], action_of(twist)]}
+        self._previous = np.concatenate(known[self._knows], 1)
         return touched
 
     def _move_joints(self, trip: Trip, action: np.ndarray) -> bool:

@@ -61,20 +61,21 @@ class AgentSenses:
         joints: whether it moves the joints, else it chooses velocities.
         cameras: by the name of their images.
         height_scan: whether it also reads the height of the ground.
+        steps: numbers that it knows of its last step.
 
     Attributes:
         space: of the observations.
     """
 
-    def __init__(self, joints: bool, cameras: Mapping[str, Camera], height_scan: bool) -> None:
+    def __init__(self, joints: bool, cameras: Mapping[str, Camera], height_scan: bool, steps: int) -> None:
         self._joints, self._cameras, self._with_scan = joints, dict(cameras), height_scan
         parts: dict[str, spaces.Space[Any]] = {}
         if joints:
             parts["goal"] = spaces.Box(_GOAL_LOW, _GOAL_HIGH, dtype=np.float32)
             parts["proprioception"] = spaces.Box(-CLIP, CLIP, (PROPRIOCEPTION_SIZE,), np.float32)
         else:
-            ends = np.array([-1, -1], np.float32), np.array([1, 1], np.float32)
-            low, high = np.concatenate([_GOAL_LOW, ends[0]]), np.concatenate([_GOAL_HIGH, ends[1]])
+            ends = np.ones(steps, np.float32)
+            low, high = np.concatenate([_GOAL_LOW, -ends]), np.concatenate([_GOAL_HIGH, ends])
             parts["vector"] = spaces.Box(low, high, dtype=np.float32)
         if height_scan:
             parts["height_scan"] = spaces.Box(-CLIP, CLIP, (SCAN_SIZE,), np.float32)
