@@ -14,7 +14,7 @@ from vinl.nav.environment import NavEnvironment
 def test_steps_are_well_formed(config, homes):
     environment = NavEnvironment(config, homes)
     depth, vector = environment.observe()
-    assert depth.shape == (32, 12, 16) and depth.dtype == torch.float16 and vector.shape == (32, 5)
+    assert depth.shape == (32, 12, 16) and depth.dtype == torch.float16 and vector.shape == (32, 7)
     assert (vector[:, 3:] == 0).all()
     for _ in range(20):
         action = torch.rand(32, 2) * 3 - 1.5
@@ -23,7 +23,7 @@ def test_steps_are_well_formed(config, homes):
         assert step.depth.min() >= 0 and step.depth.max() <= 1
         going = ~step.done
         moved = going & (environment.state["in_a_row"] == 0)
-        torch.testing.assert_close(step.vector[moved, 3:], action[moved].clamp(-1, 1))
+        torch.testing.assert_close(step.vector[moved, -2:], action[moved].clamp(-1, 1))
         torch.testing.assert_close(step.vector[:, 1:3].norm(dim=1), torch.ones(32))
     measures = environment.read_measures()
     assert measures["blocked"] > 0 and measures["evicted"] == measures["unplaced"] == 0
@@ -106,5 +106,5 @@ def test_the_motion_seen_is_what_the_poses_say(config, homes):
         _, done, _ = environment.advance(torch.rand(200, 2) * 2 - 1)
         twist = measure_twist(before, poses(), 0.5)
         wanted = torch.tensor(twist[:, [0, 2]] * [2, 3 / np.pi] - [1, 0]).clamp(-1, 1).float()
-        torch.testing.assert_close(environment.observe()[1][:, 3:], wanted, atol=2e-3, rtol=0)
+        torch.testing.assert_close(environment.observe()[1][:, -2:], wanted, atol=2e-3, rtol=0)
         environment.restart(done)

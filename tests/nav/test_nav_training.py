@@ -205,7 +205,7 @@ def test_processes_have_homes_and_chance_of_their_own():
 def test_the_critic_may_see_the_distance(tmp_path, small):
     assert train(small, tmp_path / "run", "--iterations", "1", "network.privileged=true", "network.values=8") == 0
     assert weights(tmp_path / "run")["value.0.weight"].shape == (8, 17)
-    assert load_policy(tmp_path / "run").network.observation_size == 5
+    assert load_policy(tmp_path / "run").network.observation_size == 7
 
 
 def test_settings_reach_the_algorithm():

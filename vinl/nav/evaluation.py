@@ -54,6 +54,8 @@ class NavEvaluation:
         steps: an episode ends after so many decisions of 0.5 s [paper code: 250].
         goals: in each home.
         clutter: share of the homes with blocks that are seen but stop no robot.
+        start_clearance: starts keep this distance from walls and furniture [m]; the rectangle turns on the spot with
+            0.36 m, and starts lie up to 0.07 m off the cells' centres. In ``vinl eval`` it is 0.5 m [paper].
     """
 
     episodes: int = 1000
@@ -63,6 +65,7 @@ class NavEvaluation:
     steps: int = 250
     goals: int = 8
     clutter: float = 0.0
+    start_clearance: float = 0.45
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 65536:
@@ -194,7 +197,15 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
     episodes: EpisodeConfig = replace(
         config.episodes, distance=rules.distance, steps=rules.steps, start_speed=(0.0, 0.0)
     )
-    homes = replace(config.homes, goals=rules.goals, starts=512, fresh=0.0, plans=(), plans_share=0.0)
+    homes = replace(
+        config.homes,
+        goals=rules.goals,
+        starts=512,
+        start_clearance=rules.start_clearance,
+        fresh=0.0,
+        plans=(),
+        plans_share=0.0,
+    )
     return replace(
         config,
         num_envs=rules.episodes,
