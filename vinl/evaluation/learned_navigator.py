@@ -26,7 +26,7 @@ class LearnedNavigator:
     wall reads that it stands. One whose card lists ``previous_action`` gets what it asked for; a card may list both.
 
     Args:
-        policy: observes (n, 5): distance / 5 m, cosine and sine of the bearing, and its last step; and depth.
+        policy: observes (n, 5 or 7): distance / 5 m, cosine and sine of the bearing, and its last step; and depth.
         period: between two decisions [s].
 
     Attributes:
