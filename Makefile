@@ -13,7 +13,7 @@ OUT ?= runs/demo
 
 demo: install
 	$(BIN)/vinl eval --floorplans $(PLANS) --loco teacher --nav oracle --episodes 2 --seeds 1 --obstacles paper \
-	  --out $(OUT) --video
+	  --out $(OUT) --video --fresh
 
 PLANS ?= $(shell $(BIN)/python -c "import vinl; print(*vinl.shipped_floorplans()[:2])" 2>/dev/null)
 

@@ -9,9 +9,10 @@ import pytest
 
 from vinl.config.errors import InputError
 from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.evaluate import Protocol, evaluate_rows
+from vinl.evaluation.evaluate import evaluate_rows
 from vinl.evaluation.journal import Journal, describe_differences, read_about, read_episodes, read_plans
 from vinl.evaluation.navigator import load_navigator
+from vinl.evaluation.protocol import Protocol
 from vinl.evaluation.records import Results
 from vinl.evaluation.work import Row
 from vinl.policies.policy import LocomotionPolicy
@@ -78,6 +79,10 @@ def test_an_episode_is_walked_again_for_its_film(
         assert results.records[0] == before[0].record
         told.clear()
     assert (folder / EPISODES).read_bytes().startswith(kept)
+    film = folder / "two_rooms_episode0_seed0.mp4"
+    film.write_bytes(b"of another robot")
+    evaluate_rows([row], protocol, 1, [folder], keep=True, fresh=True)
+    assert film.stat().st_size > 1000
 
 
 def test_another_evaluation_is_refused(

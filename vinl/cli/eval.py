@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from vinl.evaluation.evaluate import Protocol
     from vinl.evaluation.progress import Progress
+    from vinl.evaluation.protocol import Protocol
     from vinl.evaluation.work import Row
 
 
@@ -83,8 +83,9 @@ def main(argv: list[str]) -> int:
     options = parse_options(Options, argv, "eval")
     from vinl.config.loader import load_config
     from vinl.evaluation.config import EvaluationConfig
-    from vinl.evaluation.evaluate import Films, Protocol, check_numbers, name_apart
+    from vinl.evaluation.evaluate import check_numbers, name_apart
     from vinl.evaluation.outputs import check_folder
+    from vinl.evaluation.protocol import Films, Protocol
     from vinl.evaluation.results_file import check_out, strip_command
     from vinl.evaluation.routes import read_routes
     from vinl.evaluation.shard import Shard

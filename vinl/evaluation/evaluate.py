@@ -3,77 +3,30 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
 
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.config.loader import dump_config
 from vinl.evaluation.config import EvaluationConfig
 from vinl.evaluation.crew import Crew
-from vinl.evaluation.describe import describe_navigator, describe_plan, list_packages
 from vinl.evaluation.describe import describe_policy as describe_policy
-from vinl.evaluation.episodes import draw_routes
 from vinl.evaluation.filming import film_job, missing_films
-from vinl.evaluation.journal import Journal, read_wall_seconds
-from vinl.evaluation.metrics import aggregate_episodes
 from vinl.evaluation.navigator import ORACLE, Navigator, load_navigator
-from vinl.evaluation.records import Episode, Key, Results
-from vinl.evaluation.routes import describe_routes
+from vinl.evaluation.protocol import Films, Protocol
+from vinl.evaluation.records import Episode, Results
 from vinl.evaluation.senses import check_cameras
 from vinl.evaluation.senses import check_senses as check_senses
-from vinl.evaluation.shard import Shard
+from vinl.evaluation.store import Store
 from vinl.evaluation.video import FilmJob
 from vinl.evaluation.work import Row, Shared, cut_jobs, list_keys, run_job
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
 from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan
-from vinl.world.start_goal import StartGoal
 
-Films = Literal["none", "first", "all"]
 MAX_EPISODES, MAX_SEEDS, MAX_WORKERS = 10_000, 1_000, 1_024
-
-
-@dataclass(frozen=True, eq=False)
-class Protocol:
-    """What all rows of a table have in common.
-
-    Attributes:
-        plans: where they walk; names differ, see ``name_apart``.
-        episodes: start/goal pairs a plan; the same for all seeds.
-        seeds: repetitions; a seed changes clutter, heading and joint angles at the start.
-        config: limits and rules.
-        shard: which share of the episodes is walked.
-        films: which episodes are filmed: none, the first of every plan, or all of the first seed.
-        routes: start/goal pairs of one's own for every plan, ``episodes`` each, see ``routes``; None: they are drawn.
-    """
-
-    plans: Sequence[FloorPlan]
-    episodes: int = 10
-    seeds: range = range(5)
-    config: EvaluationConfig = field(default_factory=EvaluationConfig)
-    shard: Shard = field(default_factory=Shard)
-    films: Films = "none"
-    routes: Mapping[str, Sequence[StartGoal]] | None = None
-
-    def describe(self, row: Row) -> dict[str, Any]:
-        """What the episodes of a row depend on, as plain data."""
-        return {
-            "evaluation": dump_config(self.config),
-            "obstacles": {"preset": row.obstacles, **asdict(CLUTTER[row.obstacles])},
-            "episodes_per_plan": self.episodes,
-            "seeds": list(self.seeds),
-            **({} if self.routes is None else {"routes": describe_routes(self.routes)}),
-        }
-
-    def find_routes(self, plan: FloorPlan) -> list[StartGoal]:
-        """The start/goal pairs of a plan."""
-        if self.routes is None:
-            return draw_routes(plan, self.episodes, self.config)
-        return list(self.routes[plan.name])
 
 
 def evaluate(
@@ -171,7 +124,8 @@ def evaluate_rows(
             stores.append(Store(row, protocol, folder, keep, fresh, command))
         jobs = []
         for k, (row, store) in enumerate(zip(rows, stores, strict=True)):
-            filmed = missing_films(wanted, protocol.films, protocol.seeds[0], folder=where[k])
+            known = where[k] if store.journal is not None and store.journal.resumed else None
+            filmed = missing_films(wanted, protocol.films, protocol.seeds[0], folder=known)
             missing = [key for key in wanted if key not in store.done or key in filmed]
             if store.journal is not None and missing:
                 store.journal.begin(workers)
@@ -209,67 +163,6 @@ def evaluate_rows(
     finally:
         for store in stores:
             store.close()
-
-
-class Store:
-    """The episodes of one row as they end, in memory or also in a folder.
-
-    Attributes:
-        done: what there is.
-        journal: the file, if they are kept.
-    """
-
-    def __init__(
-        self, row: Row, protocol: Protocol, folder: Path | None, keep: bool, fresh: bool, command: Sequence[str]
-    ) -> None:
-        self._protocol, self._folder = protocol, folder
-        self._config = protocol.describe(row)
-        self._policies = {
-            "locomotion": describe_policy(row.locomotor),
-            "navigation": describe_navigator(row.navigator),
-        }
-        self.journal: Journal | None = None
-        self.done: dict[Key, Episode] = {}
-        if keep and folder is not None:
-            about = {
-                "command": list(command),
-                "config": self._config,
-                "policies": self._policies,
-                "packages": list_packages(),
-                "plans": [describe_plan(plan) for plan in protocol.plans],
-                "shard": str(protocol.shard),
-            }
-            self.journal = Journal(folder, about, protocol.plans, fresh)
-            self.done = self.journal.done
-
-    def add(self, episode: Episode, wall: float) -> None:
-        """An episode ended ``wall`` seconds after the beginning."""
-        if self.journal is not None:
-            self.journal.add(episode, wall)
-        else:
-            self.done[episode.record.key] = episode
-
-    def results(self, wanted: Sequence[Key], wall: float) -> Results:
-        """The whole row. ``wall``: how long it took, unless the folder knows of earlier sessions [s]."""
-        protocol, done = self._protocol, [self.done[key] for key in wanted]
-        aggregate = aggregate_episodes([e.record for e in done], protocol.config.min_metres)
-        if self.journal is not None:
-            assert self._folder is not None
-            wall = read_wall_seconds(self._folder)
-        videos = []
-        if protocol.films != "none" and self._folder is not None:
-            chosen = missing_films(wanted, protocol.films, protocol.seeds[0], folder=None)
-            videos = [FilmJob(_plan_of(protocol, key), self.done[key], "").name for key in wanted if key in chosen]
-        return Results(done, aggregate, list(protocol.plans), self._policies, self._config, wall, videos)
-
-    def close(self) -> None:
-        """Let others write to the folder."""
-        if self.journal is not None:
-            self.journal.close()
-
-
-def _plan_of(protocol: Protocol, key: Key) -> FloorPlan:
-    return next(plan for plan in protocol.plans if plan.name == key[0])
 
 
 def name_apart(plans: Sequence[FloorPlan]) -> list[FloorPlan]:

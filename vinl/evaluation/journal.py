@@ -41,19 +41,21 @@ class Journal:
     Attributes:
         done: the episodes that are there, as the file has them.
         dropped: whether half a line was cut off.
+        resumed: whether the folder held this evaluation before.
 
     Raises:
         InputError: the folder belongs to another run, another process writes to it, or a line is broken.
     """
 
     def __init__(self, folder: Path, about: Mapping[str, Any], plans: Sequence[FloorPlan], fresh: bool = False) -> None:
-        self.folder, self.dropped = folder, False
+        self.folder, self.dropped, self.resumed = folder, False, False
         folder.mkdir(parents=True, exist_ok=True)
         if fresh:
             for name in _WRITTEN:
                 (folder / name).unlink(missing_ok=True)
         if (folder / RUN_FILE).exists():
             _refuse_other_run(folder, read_about(folder), about)
+            self.resumed = True
         elif (folder / EPISODES_FILE).exists():
             raise InputError(f"{folder} holds {EPISODES_FILE} but no {RUN_FILE}; choose another --out, or give --fresh")
         else:

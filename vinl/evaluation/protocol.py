@@ -1,0 +1,58 @@
+"""Where robots walk, by which rules: what all rows of a table have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+from vinl.config.loader import dump_config
+from vinl.evaluation.config import EvaluationConfig
+from vinl.evaluation.episodes import draw_routes
+from vinl.evaluation.routes import describe_routes
+from vinl.evaluation.shard import Shard
+from vinl.evaluation.work import Row
+from vinl.world.clutter import CLUTTER
+from vinl.world.floorplan import FloorPlan
+from vinl.world.start_goal import StartGoal
+
+Films = Literal["none", "first", "all"]
+
+
+@dataclass(frozen=True, eq=False)
+class Protocol:
+    """What all rows of a table have in common.
+
+    Attributes:
+        plans: where they walk; names differ, see ``name_apart``.
+        episodes: start/goal pairs a plan; the same for all seeds.
+        seeds: repetitions; a seed changes clutter, heading and joint angles at the start.
+        config: limits and rules.
+        shard: which share of the episodes is walked.
+        films: which episodes are filmed: none, the first of every plan, or all of the first seed.
+        routes: start/goal pairs of one's own for every plan, ``episodes`` each, see ``routes``; None: they are drawn.
+    """
+
+    plans: Sequence[FloorPlan]
+    episodes: int = 10
+    seeds: range = range(5)
+    config: EvaluationConfig = field(default_factory=EvaluationConfig)
+    shard: Shard = field(default_factory=Shard)
+    films: Films = "none"
+    routes: Mapping[str, Sequence[StartGoal]] | None = None
+
+    def describe(self, row: Row) -> dict[str, Any]:
+        """What the episodes of a row depend on, as plain data."""
+        return {
+            "evaluation": dump_config(self.config),
+            "obstacles": {"preset": row.obstacles, **asdict(CLUTTER[row.obstacles])},
+            "episodes_per_plan": self.episodes,
+            "seeds": list(self.seeds),
+            **({} if self.routes is None else {"routes": describe_routes(self.routes)}),
+        }
+
+    def find_routes(self, plan: FloorPlan) -> list[StartGoal]:
+        """The start/goal pairs of a plan."""
+        if self.routes is None:
+            return draw_routes(plan, self.episodes, self.config)
+        return list(self.routes[plan.name])

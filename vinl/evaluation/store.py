@@ -1,0 +1,72 @@
+"""The episodes of one row: in memory, or also in a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from vinl.evaluation.describe import describe_navigator, describe_plan, describe_policy, list_packages
+from vinl.evaluation.filming import missing_films
+from vinl.evaluation.journal import Journal, read_wall_seconds
+from vinl.evaluation.metrics import aggregate_episodes
+from vinl.evaluation.protocol import Protocol
+from vinl.evaluation.records import Episode, Key, Results
+from vinl.evaluation.video import name_film
+from vinl.evaluation.work import Row
+
+
+class Store:
+    """The episodes of one row as they end, in memory or also in a folder.
+
+    Attributes:
+        done: what there is.
+        journal: the file, if they are kept.
+    """
+
+    def __init__(
+        self, row: Row, protocol: Protocol, folder: Path | None, keep: bool, fresh: bool, command: Sequence[str]
+    ) -> None:
+        self._protocol, self._folder = protocol, folder
+        self._config = protocol.describe(row)
+        self._policies = {
+            "locomotion": describe_policy(row.locomotor),
+            "navigation": describe_navigator(row.navigator),
+        }
+        self.journal: Journal | None = None
+        self.done: dict[Key, Episode] = {}
+        if keep and folder is not None:
+            about = {
+                "command": list(command),
+                "config": self._config,
+                "policies": self._policies,
+                "packages": list_packages(),
+                "plans": [describe_plan(plan) for plan in protocol.plans],
+                "shard": str(protocol.shard),
+            }
+            self.journal = Journal(folder, about, protocol.plans, fresh)
+            self.done = self.journal.done
+
+    def add(self, episode: Episode, wall: float) -> None:
+        """An episode ended ``wall`` seconds after the beginning."""
+        if self.journal is not None:
+            self.journal.add(episode, wall)
+        else:
+            self.done[episode.record.key] = episode
+
+    def results(self, wanted: Sequence[Key], wall: float) -> Results:
+        """The whole row. ``wall``: how long it took, unless the folder knows of earlier sessions [s]."""
+        protocol, done = self._protocol, [self.done[key] for key in wanted]
+        aggregate = aggregate_episodes([e.record for e in done], protocol.config.min_metres)
+        if self.journal is not None:
+            assert self._folder is not None
+            wall = read_wall_seconds(self._folder)
+        videos = []
+        if protocol.films != "none" and self._folder is not None:
+            chosen = missing_films(wanted, protocol.films, protocol.seeds[0], folder=None)
+            videos = [name_film(*key) for key in wanted if key in chosen]
+        return Results(done, aggregate, list(protocol.plans), self._policies, self._config, wall, videos)
+
+    def close(self) -> None:
+        """Let others write to the folder."""
+        if self.journal is not None:
+            self.journal.close()
