@@ -39,5 +39,5 @@ def test_vector_ends_and_begins_in_one_step():
         observation, reward, success, timeout, info = envs.step(still)
     assert timeout.all() and not success.any() and reward.shape == (6,)
     assert (info["final_obs"]["vector"][:, 4] > 0).all() and (observation["vector"][:, 3:] == 0).all()
-    assert (info["episode"]["steps"] == 4).all() and info["_episode"].all()
+    assert (info["record"]["steps"] == 4).all() and info["_record"].all()
     envs.close()

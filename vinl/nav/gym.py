@@ -33,7 +33,7 @@ _FARTHEST = 200.0
 
 class NavVectorEnv(VectorEnv):
     """Many robots in many homes. An episode that ends is followed by the next in the same step; its last observation
-    is in ``info["final_obs"]``, its figures in ``info["episode"]``, both valid where ``info["_final_obs"]``.
+    is in ``info["final_obs"]``, its figures in ``info["record"]``, both valid where ``info["_final_obs"]``.
 
     Args:
         config: name of a shipped config, a YAML file, or a ``NavConfig``.
@@ -77,8 +77,8 @@ class NavVectorEnv(VectorEnv):
         info: dict[str, Any] = {}
         if done.any():
             ended = done.cpu().numpy()
-            info = {"final_obs": _observation(environment), "episode": _figures(environment.ended)}
-            info |= {"_final_obs": ended, "_episode": ended}
+            info = {"final_obs": _observation(environment), "record": _figures(environment.ended)}
+            info |= {"_final_obs": ended, "_record": ended}
             environment.restart(done)
         success = (done & ~timeout).cpu().numpy()
         return _observation(environment), reward.cpu().numpy(), success, timeout.cpu().numpy(), info
@@ -132,7 +132,7 @@ class NavEnv(gymnasium.Env):
         self._way.append(self._position())
         info, out = self._info(), bool(timeout)
         if bool(done):
-            info["episode"] = {name: value[0].item() for name, value in _figures(self.environment.ended).items()}
+            info["record"] = {name: value[0].item() for name, value in _figures(self.environment.ended).items()}
         return _first(_observation(self.environment)), float(reward), bool(done) and not out, out, info
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
