@@ -69,23 +69,23 @@ def print_table(console: Console, data: Mapping[str, Any], out: Path) -> None:
     """One line a row: the paper's figures beside ours."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("row", overflow="fold")
-    for title in ("paper %", "success %", "paper f/m", "f/m", "foot/m", "SPL", "falls %", "n"):
+    for title in ("success %", "f/m", "foot/m", "SPL", "falls %", "n"):
         table.add_column(title, justify="right", no_wrap=True)
     for name, row in data["rows"].items():
         a, paper = row["aggregate"], row["paper"]
         table.add_row(
             name,
-            f"{paper['success'][0]:.1f}" if paper else "",
-            _mean(a["success"], 1, 100),
-            f"{paper['foot_collisions_per_m'][0]:.1f}" if paper else "",
-            _mean(a["paper_foot_collisions_per_m"], 1),
+            _mean(a["success"], 1, 100) + _beside(paper, "success"),
+            _mean(a["paper_foot_collisions_per_m"], 1) + _beside(paper, "foot_collisions_per_m"),
             _mean(a["foot_collisions_per_m"], 2),
             _mean(a["spl"], 3),
             f"{100 * a['falls']:.1f}",
             str(a["episodes"]),
         )
     console.print(table)
-    console.print("f/m: foot collisions per metre by the paper's rule; foot/m: by ours, every physics step")
+    console.print(
+        "in brackets: the paper; f/m: foot collisions per metre by its rule; foot/m: by ours, every physics step"
+    )
     for name, why in data["left_out"].items():
         console.print(f"left out: row {name}: {why}", soft_wrap=True)
     console.print(f"report {out / 'report.html'}; figures {out / 'results.json'}", soft_wrap=True)
@@ -109,7 +109,11 @@ def format_gain(figure: Mapping[str, Any], sign: int, digits: int = 2, factor: f
     if figure["difference"] is None:
         return "-"
     low, high = sorted(sign * factor * value for value in figure["ci95"])
-    return f"{sign * factor * figure['difference']:+.{digits}f} ({low:+.{digits}f} to {high:+.{digits}f})"
+    return f"{sign * factor * figure['difference']:+z.{digits}f} ({low:+z.{digits}f} to {high:+z.{digits}f})"
+
+
+def _beside(paper: Mapping[str, Any] | None, key: str) -> str:
+    return f" ({paper[key][0]:.1f})" if paper else ""
 
 
 def _mean(figure: Mapping[str, Any], digits: int, factor: float = 1.0) -> str:
