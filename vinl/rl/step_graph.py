@@ -43,7 +43,8 @@ class StepGraph:
                 self._run_beside()
                 return
             graph = torch.cuda.CUDAGraph()
-            with torch.cuda.graph(graph):
+            # thread_local: what JAX's threads ask of the device meanwhile is none of this capture's business
+            with torch.cuda.graph(graph, capture_error_mode="thread_local"):
                 self._step(self._index)
             self._graphs[variant] = graph
         self._graphs[variant].replay()
