@@ -18,7 +18,8 @@ from vinl.config.loader import dump_config, load_config
 from vinl.loco import training
 from vinl.loco.config import CurriculumConfig, LocoConfig
 from vinl.loco.curriculum import next_levels
-from vinl.loco.environment import LocoEnvironment, tile_cover
+from vinl.loco.environment import LocoEnvironment
+from vinl.loco.measures import tile_cover
 from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import locomotion_card
 from vinl.policies.io import find_policy, load_policy, save_policy

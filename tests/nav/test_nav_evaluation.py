@@ -24,7 +24,8 @@ from vinl.nav.evaluation import (
     name_kind,
 )
 from vinl.nav.home_store import HomeStore
-from vinl.nav.training import build_actor, make_card
+from vinl.nav.training import make_card
+from vinl.nav.warm_start import build_actor
 from vinl.policies.io import save_policy
 from vinl.world.readers import expand_paths
 

@@ -16,15 +16,8 @@ from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.nav.config import NavConfig
 from vinl.nav.ppo_config import PpoConfig
-from vinl.nav.training import (
-    build_actor,
-    build_algorithm,
-    load_critic,
-    load_start,
-    make_card,
-    save_critic,
-    separate,
-)
+from vinl.nav.training import build_algorithm, make_card, separate
+from vinl.nav.warm_start import build_actor, load_critic, load_start, save_critic
 from vinl.policies.io import load_policy, save_policy
 from vinl.policies.nav_actor import NavActor
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from typing import Any, NamedTuple
 
 import jax
@@ -15,14 +14,14 @@ from vinl.loco.commands import DRAWS, between, draw_commands
 from vinl.loco.config import LocoConfig, RewardConfig
 from vinl.loco.curriculum import next_levels
 from vinl.loco.lost import KEPT, REASONS, Lost, keep_lost
+from vinl.loco.measures import MEASURES, TERMS, average_sums, sum_measures, tile_cover
 from vinl.loco.rewards import Motion, reward_terms
 from vinl.loco.simulation import Body, Contacts, Ground, Simulation
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
 from vinl.robot.observation import CLIP, NOISE, OBSERVATION_SIZE, observe
 from vinl.robot.rotation import rotate_inverse
 from vinl.sensing.height_scan import scan_ground
-from vinl.world.heightfield import BLOCK
-from vinl.world.terrain import RESOLUTION, TILE, Terrain, build_terrain
+from vinl.world.terrain import build_terrain
 
 _EDGE = 2.0
 """An episode ends as by time this near to the edge of the terrain [m]."""
@@ -32,34 +31,6 @@ MAX_SPEED = 150.0
 
 _UPSIDE = -0.3
 """Third component of the gravity vector in the trunk above which the robot has fallen: tilted by more than 72 deg."""
-
-_MEASURE_SIGMA = 0.25
-"""Width of the tracking terms in the measures, whatever the reward's: curves of different trainings compare."""
-
-TERMS = tuple(field.name for field in fields(RewardConfig) if field.name not in ("sigma", "floor"))
-"""The reward terms, in the order of the configuration."""
-
-MEASURES = (
-    "steps",
-    "reward",
-    "linear_tracking",
-    "yaw_tracking",
-    "linear_error2",
-    "yaw_error2",
-    "metres",
-    "falls",
-    "timeouts",
-    "episode_steps",
-    "foot_block",
-    "shank_block",
-    "foot_wall",
-    "over_block",
-    "covered",
-    "not_finite",
-    "level",
-    "clipped",
-)
-"""Sums over robots and steps, before the reward terms."""
 
 
 class State(NamedTuple):
@@ -175,28 +146,7 @@ class LocoEnvironment:
         """The sums since the last call, as means over robot steps, and set to zero. The only wait for the device."""
         sums = np.asarray(self.state.sums, dtype=np.float64)
         self.state = self.state._replace(sums=jax.device_put(jnp.zeros_like(self.state.sums), jax.devices()[0]))
-        names = [*MEASURES, *(f"reward/{name}" for name in TERMS)]
-        raw = dict(zip(names, sums.tolist(), strict=True))
-        steps, metres = max(raw["steps"], 1.0), max(raw["metres"], 1e-6)
-        ends = max(raw["falls"] + raw["timeouts"], 1.0)
-        return {
-            "reward": raw["reward"] / steps / CONTROL_DT,
-            "linear_tracking": raw["linear_tracking"] / steps,
-            "yaw_tracking": raw["yaw_tracking"] / steps,
-            "linear_rmse": math.sqrt(raw["linear_error2"] / steps),
-            "yaw_rmse": math.sqrt(raw["yaw_error2"] / steps),
-            "level": raw["level"] / steps,
-            "falls_per_minute": raw["falls"] / (steps * CONTROL_DT / 60),
-            "speed": raw["metres"] / (steps * CONTROL_DT),
-            "episode_seconds": raw["episode_steps"] / ends * CONTROL_DT,
-            "foot_block_per_m": raw["foot_block"] / metres,
-            "shank_block_per_m": raw["shank_block"] / metres,
-            "foot_wall_per_m": raw["foot_wall"] / metres,
-            "trunk_over_blocks": raw["over_block"] / max(raw["covered"], 1.0),
-            "clipped": raw["clipped"] / steps,
-            "not_finite": raw["not_finite"],
-            **{name: value / steps / CONTROL_DT for name, value in raw.items() if name.startswith("reward/")},
-        }
+        return average_sums(sums)
 
     def take_lost(self) -> list[dict[str, Any]]:
         """The states before the steps that went wrong since the last call, of at most ``lost.KEPT`` robots: the fields
@@ -329,7 +279,7 @@ class LocoEnvironment:
         moved = jnp.linalg.norm(body.qpos[:, :2] - old.body.qpos[:, :2], axis=1)
         over = self.simulation.over_block(ground, body.qpos[:, :2])
         cover = self._cover[old.level, old.column]
-        sums = self._measure(motion, old.level, reward, weighted, clipped, moved, timeout, life, broken, over, cover)
+        sums = sum_measures(motion, old.level, reward, weighted, clipped, moved, timeout, life, broken, over, cover)
 
         # pushes, new starts, new commands
         push = old.push_left <= 0
@@ -396,45 +346,6 @@ class LocoEnvironment:
             fallen=contacts.trunk_down | (gravity[:, 2] > _UPSIDE) | broken,
         )
         return motion, touching
-
-    def _measure(
-        self, m: Motion, level: Array, reward: Array, weighted: dict[str, Array], clipped: Array, moved: Array,
-        timeout: Array, life: Array, broken: Array, over: Array, cover: Array,
-    ) -> Float[Array, " m"]:  # fmt: skip
-        """Sums over robots in the order of ``MEASURES``, then the weighted reward terms."""
-        linear2 = jnp.sum((m.command[:, :2] - m.linear[:, :2]) ** 2, 1)
-        yaw2 = (m.command[:, 2] - m.angular[:, 2]) ** 2
-        values = {
-            "steps": jnp.ones(self.num_envs),
-            "reward": reward,
-            "linear_tracking": jnp.exp(-linear2 / _MEASURE_SIGMA),
-            "yaw_tracking": jnp.exp(-yaw2 / _MEASURE_SIGMA),
-            "linear_error2": linear2,
-            "yaw_error2": yaw2,
-            "metres": moved * ~broken,
-            "falls": m.fallen,
-            "timeouts": timeout,
-            "episode_steps": life * (m.fallen | timeout),
-            "foot_block": m.contacts.foot_block.any(1),
-            "shank_block": m.contacts.shank_block.any(1),
-            "foot_wall": m.contacts.foot_wall.any(1),
-            "over_block": over,
-            "covered": cover,
-            "not_finite": broken,
-            "level": level,
-            "clipped": clipped,
-        }
-        ordered = [values[name] for name in MEASURES] + [weighted[name] for name in TERMS]
-        return jnp.stack([jnp.sum(jnp.nan_to_num(value), dtype=jnp.float32) for value in ordered])
-
-
-def tile_cover(terrain: Terrain) -> Float[np.ndarray, "levels columns"]:
-    """The share of every tile that blocks cover."""
-    covered, half = np.zeros(terrain.starts.shape[:2], np.float32), round(TILE / RESOLUTION / 2)
-    for k, c in np.ndindex(covered.shape):
-        i, j = terrain.ground.frame.cell(terrain.starts[k, c, :2])
-        covered[k, c] = (terrain.ground.labels[i - half : i + half, j - half : j + half] == BLOCK).mean()
-    return covered
 
 
 def _strong(state: State) -> State:

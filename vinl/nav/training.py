@@ -10,19 +10,18 @@ from typing import Any
 
 import torch
 from rich.console import Console
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
-from tensordict import TensorDict
 
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config, dump_config
 from vinl.nav.config import NavConfig
-from vinl.nav.environment import DISTANCE_UNIT, NavEnvironment
+from vinl.nav.environment import NavEnvironment
 from vinl.nav.home_store import HomeStore
+from vinl.nav.training_env import NavTrainingEnv
+from vinl.nav.warm_start import build_actor, load_critic, load_start, save_critic
 from vinl.policies.card import PolicyCard, navigation_card
 from vinl.policies.commit import find_commit
-from vinl.policies.io import load_policy, save_policy
-from vinl.policies.nav_actor import ACTION_SIZE, PREVIOUS_SIZE, NavActor
+from vinl.policies.io import save_policy
+from vinl.policies.nav_actor import ACTION_SIZE, NavActor
 from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers, join_peers
 from vinl.rl.peer_loop import PeerLoop, peer_folder
@@ -31,59 +30,11 @@ from vinl.rl.recurrent_ppo import RecurrentPPO, RecurrentPpoSettings
 from vinl.rl.recurrent_storage import RecurrentStorage
 from vinl.rl.run_folder import RunFolder
 
-CRITIC = "critic.safetensors"
-"""File of a run beside its policy."""
-
 _SEEDS_BETWEEN = 10_000_000
 """Each process has homes of its own: their seeds lie this far apart."""
 
 _RATE_DOWN, _RATE_UP = 1.5, 1.1
 """The adaptive learning rate moves by these once an update; rsl-rl's 1.5 both ways when it moves at each minibatch."""
-
-
-class NavTrainingEnv:
-    """The navigation environment as the training loop wants it.
-
-    Args:
-        environment: the robots of this process.
-        privileged: whether observations hold the geodesic distance, for the critic.
-        peers: the processes of the training.
-    """
-
-    def __init__(self, environment: NavEnvironment, privileged: bool = False, peers: Peers | None = None) -> None:
-        self.environment, self._privileged = environment, privileged
-        self.num_envs = environment.num_envs * (peers.count if peers else 1)
-
-    def get_observations(self) -> TensorDict:
-        """Of the present state."""
-        depth, vector = self.environment.observe()
-        return self._pack(depth, vector)
-
-    def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
-        """Actions (n, 2), held to [-1, 1], to observations, rewards (n,), dones (n,) and ``time_outs`` (n,)."""
-        result = self.environment.step(actions.clamp(-1.0, 1.0))
-        return self._pack(result.depth, result.vector), result.reward, result.done, {"time_outs": result.timeout}
-
-    def read_measures(self) -> dict[str, float]:
-        """Figures of the episodes that ended since the last call."""
-        return self.environment.read_measures()
-
-    def save_state(self) -> dict[str, Any]:
-        """Of all robots."""
-        return self.environment.save_state()
-
-    def load_state(self, state: dict[str, Any] | None) -> None:
-        """Go on from a saved state; None: the robots begin anew."""
-        if state is not None:
-            self.environment.load_state(state)
-
-    def _pack(self, depth: torch.Tensor, vector: torch.Tensor) -> TensorDict:
-        seen = {"vector": vector}
-        if self.environment.camera is not None:
-            seen["depth"] = depth
-        if self._privileged:
-            seen["privileged"] = self.environment.state["distance"][:, None] / DISTANCE_UNIT
-        return TensorDict(seen, batch_size=[len(vector)])
 
 
 def train_navigator(
@@ -232,23 +183,6 @@ def build_environment(config: NavConfig, device: str, peers: Peers | None = None
     return environment
 
 
-def build_actor(config: NavConfig) -> NavActor:
-    """A navigator with fresh weights."""
-    c, n = config.camera, config.network
-    return NavActor(
-        vision=n.vision if c is not None else "none",
-        height=c.height if c is not None else 1,
-        width=c.width if c is not None else 1,
-        visual=n.visual,
-        embedding=n.embedding,
-        hidden=n.hidden,
-        layers=n.layers,
-        memory=n.memory,
-        planes=n.planes,
-        previous=PREVIOUS_SIZE * (2 if config.previous == "both" else 1),
-    )
-
-
 def build_algorithm(
     config: NavConfig, device: str, peers: Peers | None = None, weights: dict[str, torch.Tensor] | None = None
 ) -> RecurrentPPO:
@@ -303,48 +237,6 @@ def build_algorithm(
         adapt_each=p.adapt_each,
     )
     return RecurrentPPO(model, storage, rate, settings, peers)
-
-
-def load_start(policy: str, config: NavConfig) -> tuple[dict[str, torch.Tensor], PolicyCard]:
-    """Weights and card of a trained navigator to start from.
-
-    Raises:
-        InputError: it is no navigator, or has another network than the configuration.
-    """
-    loaded = load_policy(policy)
-    with torch.device("meta"):
-        wanted = build_actor(config).describe()
-    if not isinstance(loaded.network, NavActor):
-        raise InputError(f"--from {policy}: a {loaded.card.kind} policy; give a navigator")
-    given = loaded.network.describe()
-    if given != wanted:
-        other = [f"{k} {given.get(k)} instead of {wanted[k]}" for k in wanted if given.get(k) != wanted[k]]
-        raise InputError(f"--from {policy}: another network than the config's: {', '.join(other)}")
-    return loaded.network.state_dict(), loaded.card
-
-
-def save_critic(model: RecurrentActorCritic, folder: Path) -> None:
-    """What a policy folder leaves away, for ``--from``: the critic, and the spread of the actions."""
-    rest = {k: v.detach().cpu().contiguous() for k, v in model.state_dict().items() if not k.startswith("actor.")}
-    scratch = folder / (CRITIC + ".new")
-    save_file(rest, scratch)
-    scratch.replace(folder / CRITIC)
-
-
-def load_critic(model: RecurrentActorCritic, folder: Path) -> bool:
-    """Take up what ``save_critic`` left in a run's folder, if there is such a file and it is of the same shape."""
-    file = folder / CRITIC
-    if not file.is_file():
-        return False
-    try:
-        rest = load_file(file)
-    except (SafetensorError, OSError) as error:
-        raise InputError(f"{file} is broken ({error}); remove it to start with a fresh critic") from None
-    own = {k: v for k, v in model.state_dict().items() if not k.startswith("actor.")}
-    if {k: v.shape for k, v in rest.items()} != {k: v.shape for k, v in own.items()}:
-        return False
-    model.load_state_dict(rest, strict=False)
-    return True
 
 
 def make_card(
