@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-import imageio_ffmpeg
 import numpy as np
 from jaxtyping import UInt8
 from PIL import Image
@@ -27,6 +26,8 @@ def write_film(frames: Iterable[UInt8[np.ndarray, "height width 3"]], path: Path
             pause = round(1000 / rate)
             pictures[0].save(scratch, "GIF", save_all=True, append_images=pictures[1:], duration=pause, loop=0)
         else:
+            import imageio_ffmpeg  # only here: all but films do without ffmpeg
+
             for frame in frames:
                 if writer is None:
                     size = (frame.shape[1], frame.shape[0])

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import imageio_ffmpeg
 import numpy as np
 from jaxtyping import Float, UInt8
 
 from vinl.evaluation.config import EvaluationConfig
+from vinl.evaluation.film_file import write_film
 from vinl.evaluation.panels import MapPanel, colour_depth, compose
 from vinl.evaluation.records import Episode
 from vinl.evaluation.rollout import InterruptedRunError
@@ -71,32 +71,14 @@ def film(job: FilmJob, config: EvaluationConfig, is_stopped: Callable[[], bool] 
     Raises:
         InterruptedRunError: ``is_stopped`` said so.
     """
-    out = Path(job.out)
-    out.mkdir(parents=True, exist_ok=True)
-    scratch = out / f".{job.name}"
-    writer = None
-    try:
+
+    def frames() -> Iterator[UInt8[np.ndarray, "height width 3"]]:
         for frame in draw_frames(job, config):
             if is_stopped():
                 raise InterruptedRunError
-            if writer is None:
-                size = (frame.shape[1], frame.shape[0])
-                writer = imageio_ffmpeg.write_frames(
-                    str(scratch),
-                    size,
-                    fps=FPS,  # type: ignore[arg-type]
-                    quality=6,
-                    ffmpeg_log_level="error",
-                )
-                writer.send(None)
-            writer.send(np.ascontiguousarray(frame))
-        if writer is not None:
-            writer.close()
-        scratch.replace(out / job.name)
-    finally:
-        if writer is not None:
-            writer.close()
-        scratch.unlink(missing_ok=True)
+            yield frame
+
+    write_film(frames(), Path(job.out) / job.name, FPS)
     return job.name
 
 

@@ -9,6 +9,7 @@ from typing import no_type_check
 
 import warp as wp
 
+from vinl.sensing.kernels import look_through
 from vinl.sensing.warp_start import start_warp
 
 start_warp()
@@ -410,9 +411,7 @@ def render_interior(
     """Depth along the optical axis as a share of the far limit, one thread a pixel. Floor and ceiling are planes: no
     rays are lost on them, and none leaves a home through its floor."""
     n, row, column = wp.tid()
-    left = rules.tan_half[0] * (1.0 - (2.0 * wp.float32(column) + 1.0) / wp.float32(depth.shape[2]))
-    up = rules.tan_half[1] * (1.0 - (2.0 * wp.float32(row) + 1.0) / wp.float32(depth.shape[1]))
-    direction = rotation[n] * wp.vec3(1.0, left, up)
+    direction = rotation[n] * look_through(row, column, depth.shape[1], depth.shape[2], rules.tan_half)
     origin = position[n]
     far = rules.far
     if direction[2] < -1.0e-6:

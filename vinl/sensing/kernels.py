@@ -13,6 +13,16 @@ start_warp()
 wp.set_module_options({"enable_backward": False})  # nobody differentiates a picture; compiles in half the time
 
 
+@wp.func
+@no_type_check
+def look_through(row: wp.int32, column: wp.int32, height: wp.int32, width: wp.int32, tan_half: wp.vec2) -> wp.vec3:
+    """The way through the middle of a pixel in the camera's frame, of unit length along the optical axis, so that a
+    ray's parameter is planar depth."""
+    left = tan_half[0] * (1.0 - (2.0 * wp.float32(column) + 1.0) / wp.float32(width))
+    up = tan_half[1] * (1.0 - (2.0 * wp.float32(row) + 1.0) / wp.float32(height))
+    return wp.vec3(1.0, left, up)
+
+
 @wp.kernel
 @no_type_check
 def render_depth(
@@ -24,12 +34,9 @@ def render_depth(
     far: wp.float32,
     depth: wp.array(dtype=Any, ndim=3),
 ):
-    """One thread a pixel. The ray has unit length along the optical axis, so that its parameter is planar depth."""
+    """One thread a pixel."""
     image, row, column = wp.tid()
-    tan = tan_half[image]
-    left = tan[0] * (1.0 - (2.0 * wp.float32(column) + 1.0) / wp.float32(depth.shape[2]))
-    up = tan[1] * (1.0 - (2.0 * wp.float32(row) + 1.0) / wp.float32(depth.shape[1]))
-    direction = rotation[image] * wp.vec3(1.0, left, up)
+    direction = rotation[image] * look_through(row, column, depth.shape[1], depth.shape[2], tan_half[image])
     t = far
     hit = wp.mesh_query_ray(meshes[world[image]], position[image], direction, far)
     if hit.result:
@@ -52,10 +59,7 @@ def render_depth_over_floor(
     """As ``render_depth``, with a level floor that is not in the meshes: where it is hit follows from one division, and
     nothing behind it is looked for."""
     image, row, column = wp.tid()
-    tan = tan_half[image]
-    left = tan[0] * (1.0 - (2.0 * wp.float32(column) + 1.0) / wp.float32(depth.shape[2]))
-    up = tan[1] * (1.0 - (2.0 * wp.float32(row) + 1.0) / wp.float32(depth.shape[1]))
-    direction = rotation[image] * wp.vec3(1.0, left, up)
+    direction = rotation[image] * look_through(row, column, depth.shape[1], depth.shape[2], tan_half[image])
     start = position[image]
     t = far
     if direction[2] < 0.0 and start[2] > floor:
