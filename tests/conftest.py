@@ -1,16 +1,27 @@
 """Test settings: array shapes are checked, JAX and torch share two cores, every test runs in a folder of its own."""
 
+from __future__ import annotations
+
 import hashlib
+import math
 import os
 import platform
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 import hypothesis
 import pytest
 from beartype import BeartypeConf, beartype
 from jaxtyping import install_import_hook
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import mujoco
+
+    from vinl.world.boxes import Boxes
 
 for _name, _value in {
     "JAX_PLATFORMS": "cpu",
@@ -62,3 +73,26 @@ def _processor() -> str:
 def in_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever a test writes to a relative path lands in its temporary folder."""
     monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def build_mujoco_boxes() -> Callable[[Boxes], tuple[mujoco.MjModel, mujoco.MjData]]:
+    """A level floor with boxes in MuJoCo, whose rays other rays are measured against."""
+    import mujoco
+
+    def build(boxes: Boxes) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        spec = mujoco.MjSpec()
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1])
+        for x, y, yaw, length, width, bottom, top in boxes.rows:
+            spec.worldbody.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[x, y, (bottom + top) / 2],
+                size=[length / 2, width / 2, (top - bottom) / 2],
+                quat=[math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)],
+            )
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        return model, data
+
+    return build

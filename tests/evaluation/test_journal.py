@@ -54,6 +54,17 @@ def test_only_what_is_missing_is_walked(folder: Path, two_rooms: FloorPlan, trot
     assert (folder / EPISODES).stat().st_size == size  # all there: nothing is appended
 
 
+def test_two_at_once_are_refused(folder: Path, two_rooms: FloorPlan, trotting: LocomotionPolicy) -> None:
+    about, kept = read_about(folder), (folder / EPISODES).read_bytes()
+    journal = Journal(folder, about, [two_rooms])
+    for fresh in (False, True):
+        with pytest.raises(InputError, match="another vinl eval is writing there"):
+            run(two_rooms, trotting, folder, fresh=fresh)
+    assert (folder / EPISODES).read_bytes() == kept and read_about(folder) == about
+    journal.close()
+    run(two_rooms, trotting, folder)
+
+
 def test_fresh_begins_anew(folder: Path, two_rooms: FloorPlan, trotting: LocomotionPolicy) -> None:
     told: list[tuple[str, int, int]] = []
     run(two_rooms, trotting, folder, fresh=True, on_progress=lambda *x: told.append(x))
@@ -113,15 +124,6 @@ def test_a_broken_line_is_named(folder: Path, two_rooms: FloorPlan, trotting: Lo
     (folder / EPISODES).write_bytes(lines[0] + b'{"record": {}}\n' + lines[1])
     with pytest.raises(InputError, match="line 2 is broken"):
         run(two_rooms, trotting, folder)
-
-
-def test_two_at_once_are_refused(folder: Path, two_rooms: FloorPlan, trotting: LocomotionPolicy) -> None:
-    about = read_about(folder)
-    journal = Journal(folder, about, [two_rooms])
-    with pytest.raises(InputError, match="another vinl eval is writing there"):
-        run(two_rooms, trotting, folder)
-    journal.close()
-    run(two_rooms, trotting, folder)
 
 
 def test_plans_come_back_as_they_were(folder: Path, two_rooms: FloorPlan) -> None:

@@ -1,9 +1,14 @@
 """A small training ground that compiles in seconds."""
 
+from collections.abc import Callable
+from types import ModuleType
+
+import jax
 import pytest
 
 from vinl.config.loader import load_config
 from vinl.loco.config import LocoConfig
+from vinl.loco.environment import LocoEnvironment
 
 SMALL = [
     "num_envs=8",
@@ -30,3 +35,21 @@ def small_overrides() -> list[str]:
 def small_config() -> LocoConfig:
     """Eight robots on four tiles."""
     return load_config(LocoConfig, "loco/rough", SMALL)
+
+
+@pytest.fixture
+def share_environment(monkeypatch: pytest.MonkeyPatch):
+    """``share_environment(module, env)``: what the module trains starts one environment anew instead of making its own,
+    because to compile one takes most of the time. Returns the function that does so."""
+
+    def share(module: ModuleType, env: LocoEnvironment) -> Callable[..., LocoEnvironment]:
+        def start(config: LocoConfig = env.config) -> LocoEnvironment:
+            env.set_rewards(config.rewards)
+            env.state = jax.device_put(jax.jit(env._first_state)(jax.random.PRNGKey(config.seed)), jax.devices()[0])
+            env.take_lost()
+            return env
+
+        monkeypatch.setattr(module, "LocoEnvironment", start)
+        return start
+
+    return share

@@ -41,17 +41,8 @@ def env() -> LocoEnvironment:
 
 
 @pytest.fixture
-def fresh(env, monkeypatch):
-    """One environment for all trainings: to compile it takes most of the time."""
-
-    def start(config: LocoConfig | None = None) -> LocoEnvironment:
-        env.state = jax.device_put(jax.jit(env._first_state)(jax.random.PRNGKey(0)), jax.devices()[0])
-        env.read_measures()
-        env.take_lost()
-        return env
-
-    monkeypatch.setattr(training, "LocoEnvironment", start)
-    return start()
+def fresh(env, share_environment) -> LocoEnvironment:
+    return share_environment(training, env)()
 
 
 def spoil(monkeypatch, steps: dict[int, list[int]], speed: float = 1e9) -> None:

@@ -44,20 +44,9 @@ def see(terrain, config, poses, camera=CAMERA, seed=1, steps=0) -> torch.Tensor:
     return depth
 
 
-def test_the_student_sees_what_mujoco_has_in_its_way(terrain, poses):
+def test_the_student_sees_what_mujoco_has_in_its_way(terrain, poses, build_mujoco_boxes):
     """MuJoCo's rays against a plane and boxes, the ground of the evaluation."""
-    spec = mujoco.MjSpec()
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[100, 100, 1])
-    for x, y, yaw, length, width, bottom, top in (terrain.blocks.boxes() + terrain.tall).rows:
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=[x, y, (bottom + top) / 2],
-            size=[length / 2, width / 2, (top - bottom) / 2],
-            quat=[np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)],
-        )
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = build_mujoco_boxes(terrain.blocks.boxes() + terrain.tall)
     tx, ty = CAMERA.tan_half
     seen = see(terrain, EXACT, poses).float().numpy() * CAMERA.far
     wrong, hits = 0, set()

@@ -59,15 +59,8 @@ def env(config) -> LocoEnvironment:
 
 
 @pytest.fixture
-def compiled_once(env, monkeypatch):
-    """Trainings share one environment: to compile it takes most of the time."""
-
-    def fresh(config: LocoConfig) -> LocoEnvironment:
-        env.set_rewards(config.rewards)
-        env.state = jax.device_put(jax.jit(env._first_state)(jax.random.PRNGKey(config.seed)), jax.devices()[0])
-        return env
-
-    monkeypatch.setattr(training, "LocoEnvironment", fresh)
+def compiled_once(env, share_environment) -> None:
+    share_environment(training, env)
 
 
 def read_rows(folder):

@@ -49,14 +49,8 @@ def env() -> LocoEnvironment:
 
 
 @pytest.fixture
-def compiled_once(env, monkeypatch):
-    """Trainings share one environment: to compile it takes most of the time."""
-
-    def fresh(config: LocoConfig) -> LocoEnvironment:
-        env.state = jax.device_put(jax.jit(env._first_state)(jax.random.PRNGKey(config.seed)), jax.devices()[0])
-        return env
-
-    monkeypatch.setattr(stage3, "LocoEnvironment", fresh)
+def compiled_once(env, share_environment) -> None:
+    share_environment(stage3, env)
 
 
 def read_rows(folder):

@@ -95,7 +95,7 @@ def test_out_is_written_in_place_and_views_each_have_their_field_of_view():
     assert torch.allclose(out[0], torch.tensor(1.0)) and torch.allclose(out[1], torch.tensor(2.0))
 
 
-def test_agrees_with_mujoco_rays():
+def test_agrees_with_mujoco_rays(build_mujoco_boxes):
     """Random boxes, random camera poses, against MuJoCo's own exact ray and box intersection."""
     rng = np.random.default_rng(3)
     n = 25
@@ -105,18 +105,7 @@ def test_agrees_with_mujoco_rays():
              rng.uniform(1.1, 2, n)]
         )
     )  # fmt: skip
-    spec = mujoco.MjSpec()
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1])
-    for x, y, yaw, length, width, bottom, top in boxes.rows:
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=[x, y, (bottom + top) / 2],
-            size=[length / 2, width / 2, (top - bottom) / 2],
-            quat=[math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)],
-        )
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = build_mujoco_boxes(boxes)
     camera = Camera("test", (0.1, 0.02, 0.03), 0.2, math.radians(80), 16, 12, 6.0)
     k = 12
     positions = np.column_stack([rng.uniform(-4, 4, (k, 2)), rng.uniform(0.2, 2.4, k)])

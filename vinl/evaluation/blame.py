@@ -64,11 +64,7 @@ def measure_distance(at: Float[np.ndarray, "2"], blocks: Blocks) -> float:
     """From a point to the nearest block's footprint [m]; infinite without blocks."""
     if not len(blocks):
         return float("inf")
-    x, y, yaw, length, width = blocks.rows[:, :5].T
-    dx, dy = at[0] - x, at[1] - y
-    along = np.abs(np.cos(yaw) * dx + np.sin(yaw) * dy) - length / 2
-    across = np.abs(np.cos(yaw) * dy - np.sin(yaw) * dx) - width / 2
-    return float(np.hypot(np.maximum(along, 0), np.maximum(across, 0)).min())
+    return float(blocks.boxes().distances(at[None]).min())
 
 
 def count_failures(records: Sequence[EpisodeRecord]) -> dict[str, Any]:

@@ -22,7 +22,9 @@ RUN_FILE, EPISODES_FILE, PLANS = "run.json", "episodes.jsonl", "plans"
 SCHEMA = 1
 """Version of ``run.json`` and ``episodes.jsonl``."""
 
-_WRITTEN = (EPISODES_FILE, "results.json", "report.html", RUN_FILE)
+_WRITTEN = ("results.json", "report.html", RUN_FILE)
+"""What a run leaves beside its episodes."""
+
 _SHOWN = 3
 
 
@@ -50,25 +52,30 @@ class Journal:
     def __init__(self, folder: Path, about: Mapping[str, Any], plans: Sequence[FloorPlan], fresh: bool = False) -> None:
         self.folder, self.dropped, self.resumed = folder, False, False
         folder.mkdir(parents=True, exist_ok=True)
-        if fresh:
-            for name in _WRITTEN:
-                (folder / name).unlink(missing_ok=True)
-        if (folder / RUN_FILE).exists():
-            _refuse_other_run(folder, read_about(folder), about)
-            self.resumed = True
-        elif (folder / EPISODES_FILE).exists():
-            raise InputError(f"{folder} holds {EPISODES_FILE} but no {RUN_FILE}; choose another --out, or give --fresh")
-        else:
-            keep_plans(folder, plans)
-            write_json(folder / RUN_FILE, {"schema": SCHEMA, **about})
         self._file = (folder / EPISODES_FILE).open("a+b")
         try:
-            _lock(self._file, folder)
+            _lock(self._file, folder)  # before anything is forgotten or written: another run may be at work here
+            self._take_folder(about, plans, fresh)
             self._cut_half_line()
             self.done = {episode.record.key: episode for episode in read_episodes(folder)}
         except InputError:
             self._file.close()
             raise
+
+    def _take_folder(self, about: Mapping[str, Any], plans: Sequence[FloorPlan], fresh: bool) -> None:
+        folder = self.folder
+        if fresh:
+            self._file.truncate(0)
+            for name in _WRITTEN:
+                (folder / name).unlink(missing_ok=True)
+        if (folder / RUN_FILE).exists():
+            _refuse_other_run(folder, read_about(folder), about)
+            self.resumed = True
+        elif (folder / EPISODES_FILE).stat().st_size:
+            raise InputError(f"{folder} holds {EPISODES_FILE} but no {RUN_FILE}; choose another --out, or give --fresh")
+        else:
+            keep_plans(folder, plans)
+            write_json(folder / RUN_FILE, {"schema": SCHEMA, **about})
 
     def begin(self, workers: int) -> None:
         """Note that a session begins, for the time that the whole took."""

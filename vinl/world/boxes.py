@@ -60,7 +60,15 @@ class Boxes:
 
     def contain(self, points: Float[np.ndarray, "k 2"]) -> Bool[np.ndarray, "n k"]:
         """Which box's footprint holds which point (edges included)."""
+        return self._beyond(points).max(-1) <= 1e-9
+
+    def distances(self, points: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "n k"]:
+        """From each box's footprint to each point [m]; zero inside."""
+        return np.hypot(*np.moveaxis(np.maximum(self._beyond(points), 0.0), -1, 0))
+
+    def _beyond(self, points: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "n k 2"]:
+        """How far points lie beyond the footprints' sides, along each box's own axes [m]; negative inside."""
         d = np.asarray(points)[None] - self.rows[:, None, :2]
         c, s = np.cos(self.rows[:, 2, None]), np.sin(self.rows[:, 2, None])
-        u, v = c * d[..., 0] + s * d[..., 1], -s * d[..., 0] + c * d[..., 1]
-        return (np.abs(u) <= self.rows[:, 3, None] / 2 + 1e-9) & (np.abs(v) <= self.rows[:, 4, None] / 2 + 1e-9)
+        own = np.stack([c * d[..., 0] + s * d[..., 1], -s * d[..., 0] + c * d[..., 1]], -1)
+        return np.abs(own) - self.rows[:, None, 3:5] / 2

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from scipy import ndimage
 
 from vinl.config.errors import InputError
@@ -21,6 +21,9 @@ RESOLUTION = 0.05
 
 TILE = 8.0
 """Side of a tile [m] [ViNL config]."""
+
+_START = np.zeros((1, 2))
+"""Robots start around the middle of a tile."""
 
 BORDER = 8.0
 """Level ground around all tiles [m]."""
@@ -272,19 +275,10 @@ def _tile_blocks(
         count = round(config.row_density * TILE**2)
         here = scatter_centres(rng, count, TILE / 2 - 0.3, config.start_clear, 1.0, np.zeros((0, 2)))
         rows = draw_rows(rng, here, config.row_length, heights)
-        kept = _leave_start(rows.boxes(), config.start_clear)
-        blocks += Blocks(rows.rows[kept])
+        blocks += Blocks(rows.rows[rows.boxes().distances(_START)[:, 0] > config.start_clear])
     return Blocks(blocks.rows + np.array([*middle, 0, 0, 0, 0]))
 
 
 def _off_the_start(boxes: Boxes) -> Boxes:
     """The boxes of a tile that a robot can start beside: they leave a disc of 1.3 m around its middle free."""
-    return Boxes(boxes.rows[_leave_start(boxes, 1.3)])
-
-
-def _leave_start(boxes: Boxes, radius: float) -> Bool[np.ndarray, " n"]:
-    """Which boxes of a tile leave a disc around its middle free [m]."""
-    x, y, yaw, length, width = boxes.rows[:, :5].T
-    u, v = -np.cos(yaw) * x - np.sin(yaw) * y, np.sin(yaw) * x - np.cos(yaw) * y
-    gap = np.hypot(np.maximum(np.abs(u) - length / 2, 0), np.maximum(np.abs(v) - width / 2, 0))
-    return gap > radius
+    return Boxes(boxes.rows[boxes.distances(_START)[:, 0] > 1.3])
