@@ -20,8 +20,8 @@ from vinl.evaluation.config import EvaluationConfig
 from vinl.evaluation.oracle import OracleNavigator
 from vinl.evaluation.records import plain_record
 from vinl.evaluation.senses import Senses
-from vinl.gym.actions import JOINT_REACH, action_of, velocity_of
-from vinl.gym.home import HomeEnv
+from vinl.gym.actions import JOINT_REACH
+from vinl.gym.home import RANGE, HomeEnv
 from vinl.nav.config import NavConfig
 from vinl.policies.card import navigation_table
 from vinl.policies.policy import LocomotionPolicy
@@ -36,7 +36,7 @@ class StepwiseOracle(OracleNavigator):
     """The oracle with the resolution of an action."""
 
     def act(self, observation: dict[str, Any]) -> np.ndarray:
-        return np.stack([velocity_of(action) for action in action_of(super().act(observation))])
+        return RANGE.velocity(RANGE.action(super().act(observation)))
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_oracle_walks_the_episode_that_evaluate_walks() -> None:
     began = info["geodesic_m"]
     oracle.reset([env.trip.task])
     while not (over or out):
-        action = action_of(oracle.act({"pose": env.trip.pose}))[0]
+        action = RANGE.action(oracle.act({"pose": env.trip.pose}))[0]
         observation, reward, over, out, info = env.step(action)
         rewards.append(reward)
         assert env.observation_space.contains(observation)

@@ -11,8 +11,9 @@ from jaxtyping import Float
 from vinl.config.errors import InputError
 from vinl.evaluation.navigator import Task
 from vinl.evaluation.odometry import measure_twist
-from vinl.policies.card import FORWARD_SPEED, NAVIGATION_TABLE, YAW_RATE, PolicyCard, find_previous
+from vinl.policies.card import NAVIGATION_TABLE, PolicyCard, find_previous
 from vinl.policies.policy import Policy
+from vinl.policies.velocity_range import VelocityRange
 from vinl.robot.cameras import Camera
 
 _DISTANCE_SCALE = float(NAVIGATION_TABLE[0]["scale"][0])
@@ -45,9 +46,7 @@ class LearnedNavigator:
             )
         self.policy = policy
         self.camera: Camera | None = policy.camera
-        action = policy.card.action
-        low, high = np.array([action.get("forward_speed", FORWARD_SPEED), action.get("yaw_rate", YAW_RATE)]).T
-        self._middle, self._half = (high + low) / 2, (high - low) / 2
+        self._range = VelocityRange.of(policy.card)
         self._period, self._previous = period, find_previous(policy.card)
         self._last = np.zeros((0, 2), np.float32)
         self._pose: np.ndarray | None = None
@@ -74,12 +73,11 @@ class LearnedNavigator:
         vector = np.concatenate(parts, 1)
         action = self.policy.act(vector) if self.camera is None else self.policy.act(vector, observation["depth"])
         self._last = np.clip(np.asarray(action, np.float32), -1.0, 1.0)
-        return self._middle + self._half * self._last.astype(np.float64)
+        return self._range.velocity(self._last)
 
     def _measure(self, pose: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
         """The motion since the last decision in units of the action; zero at the first."""
         before, self._pose = self._pose, pose.copy()
         if before is None:
             return np.zeros((len(pose), 2), np.float32)
-        twist = measure_twist(before, pose, self._period)[:, [0, 2]]
-        return np.clip((twist - self._middle) / self._half, -1.0, 1.0).astype(np.float32)
+        return self._range.action(measure_twist(before, pose, self._period)[:, [0, 2]])

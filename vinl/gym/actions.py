@@ -6,24 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.config.errors import InputError
-from vinl.policies.card import FORWARD_SPEED, YAW_RATE
 from vinl.robot.aliengo import DEFAULT_POSE
-
-_LOW, _HIGH = np.array([FORWARD_SPEED, YAW_RATE]).T
 
 JOINT_REACH = 4.0
 """Joint target = default pose + this x action [rad]. Holds what the shipped locomotors ask for: up to 3.4 rad, far
 beyond where the joints get, for a target is the way to ask for a torque."""
-
-
-def velocity_of(action: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
-    """Forward speed [m/s] and yaw rate [rad/s] of a navigator's action, as ``NavActor`` has it."""
-    return (_LOW + _HIGH) / 2 + (_HIGH - _LOW) / 2 * action.astype(np.float64)
-
-
-def action_of(velocity: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
-    """The action that asks for a forward speed [m/s] and a yaw rate [rad/s], the nearest if they are out of range."""
-    return np.clip((2 * velocity - _LOW - _HIGH) / (_HIGH - _LOW), -1.0, 1.0).astype(np.float32)
 
 
 def joint_target_of(action: Float[np.ndarray, "12"], reach: float) -> Float[np.ndarray, "12"]:

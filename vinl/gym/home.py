@@ -20,7 +20,7 @@ from vinl.evaluation.crew import one_thread
 from vinl.evaluation.episodes import draw_routes, draw_setup
 from vinl.evaluation.odometry import measure_twist
 from vinl.evaluation.records import plain_record
-from vinl.gym.actions import JOINT_REACH, action_of, check_action, joint_target_of, velocity_of
+from vinl.gym.actions import JOINT_REACH, check_action, joint_target_of
 from vinl.gym.chase import ChaseView
 from vinl.gym.drivers import Guide, Legs
 from vinl.gym.senses import AgentSenses, Cameras, choose_cameras
@@ -28,6 +28,7 @@ from vinl.gym.trip import Trip
 from vinl.nav.config import NavConfig
 from vinl.policies.card import navigation_table
 from vinl.policies.policy import Policy
+from vinl.policies.velocity_range import VelocityRange
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT
 from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan
@@ -37,6 +38,7 @@ from vinl.world.start_goal import sample_start_goals
 
 Plans = str | Path | FloorPlan | Sequence[str | Path | FloorPlan]
 CONTROLS = ("velocity", "joints")
+RANGE = VelocityRange()
 
 
 class HomeEnv(gymnasium.Env):
@@ -217,14 +219,14 @@ class HomeEnv(gymnasium.Env):
         """Have the locomotor carry out a velocity. True if a wall was touched."""
         assert self._legs is not None
         before, began, touched = trip.pose, trip.steps, False
-        self._command[0, ::2] = velocity_of(action)
+        self._command[0, ::2] = RANGE.velocity(action)
         for _ in range(self._rules.navigation_period):
             trip.advance(self._legs.choose(trip, self._command), self._command)
             touched = touched or trip.touched_wall
             if trip.end:
                 break
         twist = measure_twist(before, trip.pose, (trip.steps - began) * CONTROL_DT)[:, [0, 2]]
-        known = {"action": [action[None]], "motion": [action_of(twist)], "both": [action[None], action_of(twist)]}
+        known = {"action": [action[None]], "motion": [RANGE.action(twist)], "both": [action[None], RANGE.action(twist)]}
         self._previous = np.concatenate(known[self._knows], 1)
         return touched
 
