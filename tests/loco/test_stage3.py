@@ -90,6 +90,24 @@ def test_it_trains_and_a_resumed_run_ends_with_the_very_same_weights(tmp_path, c
     assert [row["iteration"] for row in read_rows(stopped)] == [1, 2, 3]
 
 
+def test_a_student_goes_on_from_another_under_a_new_teacher(tmp_path, compiled_once, capsys):
+    first, second = tmp_path / "first", tmp_path / "second"
+    command = ["train-loco", "--stage", "3", "--device", "cpu", "--iterations", "1"]
+    assert main([*command, *SMALL, "--from", "rough", "--out", str(first)]) == 0
+    slow = ["student.distillation.learning_rate=1e-9", "student.distillation.last_learning_rate=1e-9"]
+    start = [*slow, f"student.start={first}"]
+    assert main([*command, *SMALL, *start, "--from", "teacher", "--out", str(second)]) == 0
+    old, new = (load_policy(run).network.state_dict() for run in (first, second))
+    teacher = load_policy("teacher").network.state_dict()
+    for name, weight in new.items():
+        wanted = teacher[name] if name.startswith("actor.") else old[name]
+        torch.testing.assert_close(weight, wanted, atol=1e-6, rtol=0)
+    capsys.readouterr()
+    other = ["student.network.hidden=32", f"student.start={first}", "--out", str(tmp_path / "third")]
+    assert main([*command, *SMALL, "--from", "teacher", *other]) == 2
+    assert "student.network and student.camera" in capsys.readouterr().err
+
+
 def test_a_robot_that_goes_wrong_is_set_back_and_saved(tmp_path, compiled_once, monkeypatch):
     step, count = LocoEnvironment.step, 0
 

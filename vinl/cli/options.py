@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
+from dataclasses import fields
 from typing import Any, TypeVar
 
 import tyro
@@ -12,6 +14,7 @@ from vinl.config.errors import InputError
 
 T = TypeVar("T")
 _FRAME = " │╰╯─"
+_SETTING = re.compile(r"[A-Za-z_][\w.]*=")
 
 
 def parse_options(options: type[T] | Any, argv: list[str], command: str, *markers: Any) -> T:
@@ -34,6 +37,23 @@ def parse_options(options: type[T] | Any, argv: list[str], command: str, *marker
         if not end.code:
             raise
         raise InputError(f"{_essence(said.getvalue())} (vinl {command} --help lists the options)") from None
+
+
+def settings_first(options: type[Any], argv: list[str]) -> list[str]:
+    """Bring the words ``key=value`` of a command line together at its front, wherever they stood among the flags.
+
+    Args:
+        options: dataclass of the command; tells flags with a value from those without.
+        argv: arguments after the command.
+    """
+    switches = {"--" + field.name.replace("_", "-") for field in fields(options) if field.type in (bool, "bool")}
+    settings: list[str] = []
+    others: list[str] = []
+    for k, word in enumerate(argv):
+        last = argv[k - 1] if k else ""
+        is_value = last.startswith("--") and "=" not in last and last not in switches
+        (settings if _SETTING.match(word) and not is_value else others).append(word)
+    return settings + others
 
 
 def _essence(box: str) -> str:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import tyro
 
-from vinl.cli.options import parse_options
+from vinl.cli.options import parse_options, settings_first
 from vinl.config.errors import InputError
 
 
@@ -52,7 +52,7 @@ STAGES = {1: "loco/rough", 2: "loco/teacher", 3: "loco/student"}
 
 def main(argv: list[str]) -> int:
     """Run the command; returns 130 after an interrupt, 1 where numbers were not finite."""
-    options = parse_options(Options, argv, "train-loco")
+    options = parse_options(Options, settings_first(Options, argv), "train-loco")
     if options.stage not in STAGES:
         raise InputError(f"--stage {options.stage} does not exist; choose {', '.join(map(str, STAGES))}")
     if options.save_every <= 0:

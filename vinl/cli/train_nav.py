@@ -12,7 +12,7 @@ from typing import Annotated
 
 import tyro
 
-from vinl.cli.options import parse_options
+from vinl.cli.options import parse_options, settings_first
 from vinl.config.errors import InputError
 
 INTERRUPTED = 130
@@ -56,7 +56,7 @@ class Options:
 
 def main(argv: list[str]) -> int:
     """Run the command; returns 130 after an interrupt."""
-    options = parse_options(Options, argv, "train-nav")
+    options = parse_options(Options, settings_first(Options, argv), "train-nav")
     if options.save_every <= 0:
         raise InputError(f"--save-every must be positive, got {options.save_every}")
     if options.devices < 1:

@@ -20,7 +20,7 @@ from vinl.loco.warm_start import load_teacher
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.commit import find_commit
 from vinl.policies.depth_actor import DepthActor
-from vinl.policies.io import save_policy
+from vinl.policies.io import load_policy, save_policy
 from vinl.policies.networks import MapActor
 from vinl.rl.loop import TrainingLoop
 from vinl.rl.run_folder import RunFolder
@@ -66,6 +66,21 @@ def build_student(config: StudentConfig, teacher: MapActor) -> DepthActor:
     return student
 
 
+def take_over(student: DepthActor, name_or_path: str) -> None:
+    """Give a student the image network and memory of another; the teacher's actor behind them comes later.
+
+    Raises:
+        InputError: no such policy, or one with other networks.
+    """
+    other = load_policy(name_or_path).network
+    if other.describe() != student.describe():
+        raise InputError(
+            f"student.start={name_or_path}: its network {other.describe()} is not that of this training "
+            f"{student.describe()}; set student.network and student.camera to its own"
+        )
+    student.load_state_dict(other.state_dict())
+
+
 def train_student(
     config: LocoConfig,
     run: RunFolder,
@@ -101,6 +116,8 @@ def train_student(
     torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
     stopwatch = Stopwatch(device)
     student = build_student(settings, teacher)
+    if settings.start and not resume:
+        take_over(student, settings.start)
     environment = LocoEnvironment(config)
     camera = settings.camera.record()
     mesh = terrain_mesh(environment.terrain)
