@@ -13,29 +13,32 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+import numpy as np
+
+PANELS = {
+    "level": "mean level (0-9)",
+    "linear_tracking": "velocity tracking, exp(-error² / 0.25)",
+    "falls_per_minute": "falls per robot-minute",
+    "foot_block_per_m": "feet and shanks on blocks, control steps per metre",
+    "trunk_over_blocks": "time above blocks / the share of ground they cover",
+    "loss/unexplained": "unexplained share of the teacher's code",
+    "success": "success",
+    "spl": "SPL",
+    "collisions": "cancelled steps of an episode",
+    "action_std": "spread of the actions",
+    "samples_per_second": "samples per second",
+}
+"""Figures and titles; those that a run has are drawn."""
+
+SECOND = {"linear_tracking": ("yaw_tracking", "in the plane", "turning"),
+          "foot_block_per_m": ("shank_block_per_m", "feet", "shanks")}  # fmt: skip
+"""A second line in the panel of the first."""
 
 KEPT = (
-    "iteration",
-    "samples",
-    "seconds",
-    "samples_per_second",
-    "update_seconds",
-    "level",
-    "linear_tracking",
-    "yaw_tracking",
-    "linear_rmse",
-    "yaw_rmse",
-    "falls_per_minute",
-    "reward",
-    "clipped",
-    "action_std",
-    "learning_rate",
-)
-PANELS = (
-    ("level", "mean level (0-9)"),
-    ("linear_tracking", "velocity tracking, exp(-error² / 0.25)"),
-    ("falls_per_minute", "falls per robot-minute"),
-    ("samples_per_second", "samples per second"),
+    *("iteration", "samples", "seconds", "samples_per_second", "update_seconds", "reward", "clipped", "learning_rate"),
+    *("linear_rmse", "yaw_rmse", "soft_spl", "stuck", "loss/code", "loss/action", "loss/value", "loss/kl"),
+    *PANELS,
+    *(name for name, _, _ in SECOND.values()),
 )
 
 
@@ -51,18 +54,28 @@ def main() -> None:
         total += row["seconds"]
         minutes.append(total / 60)
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    thin = [{key: row[key] for key in KEPT} for row in rows if row["iteration"] % 10 == 0 or row is rows[0]]
+    thin = [
+        {key: row[key] for key in KEPT if key in row} for row in rows if row["iteration"] % 10 == 0 or row is rows[0]
+    ]
     options.out.with_suffix(".jsonl").write_text("".join(json.dumps(row) + "\n" for row in thin))
-    figure, axes = plt.subplots(2, 2, figsize=(9, 5.4), sharex=True, layout="constrained")
-    for (name, title), axis in zip(PANELS, axes.flat, strict=True):
-        axis.plot(minutes[1:], [row[name] for row in rows[1:]], color="#2b6cb0", linewidth=1)
-        axis.set_title(title, fontsize=10, loc="left")
+    shown = [name for name in PANELS if np.ptp([row[name] for row in rows[1:] if name in row] or [0.0]) > 0.01]
+    figure, axes = plt.subplots(
+        -(-len(shown) // 2), 2, figsize=(9, 2.7 * -(-len(shown) // 2)), sharex=True, layout="constrained", squeeze=False
+    )
+    for name, axis in zip(shown, axes.flat, strict=False):
+        lines = (name, *SECOND.get(name, ())[:1])
+        for line, colour in zip(lines, ("#2b6cb0", "#dd8b20"), strict=False):
+            # the first iterations are wild
+            points = [(m, row[line]) for m, row in zip(minutes[3:], rows[3:], strict=True) if line in row]
+            axis.plot(*zip(*points, strict=True), color=colour, linewidth=1)
+        axis.set_title(PANELS[name], fontsize=10, loc="left")
         axis.grid(alpha=0.3)
         axis.spines[["top", "right"]].set_visible(False)
-        if name == "linear_tracking":
-            axis.plot(minutes[1:], [row["yaw_tracking"] for row in rows[1:]], color="#dd8b20", linewidth=1)
-            axis.legend(["in the plane", "turning"], frameon=False, fontsize=8)
-    for axis in axes[1]:
+        if name in SECOND:
+            axis.legend(SECOND[name][1:], frameon=False, fontsize=8)
+    for axis in axes.flat[len(shown) :]:
+        axis.remove()
+    for axis in axes[-1]:
         axis.set_xlabel("minutes of training")
     figure.savefig(options.out.with_suffix(".png"), dpi=110)
     print(f"{options.out.with_suffix('.png')}: {len(rows)} iterations, {rows[-1]['samples'] / 1e6:.1f} M samples, "

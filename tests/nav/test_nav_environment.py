@@ -108,3 +108,17 @@ def test_the_motion_seen_is_what_the_poses_say(config, homes):
         wanted = torch.tensor(twist[:, [0, 2]] * [2, 3 / np.pi] - [1, 0]).clamp(-1, 1).float()
         torch.testing.assert_close(environment.observe()[1][:, -2:], wanted, atol=2e-3, rtol=0)
         environment.restart(done)
+
+
+def test_the_way_that_is_found_leads_to_the_goal(config, homes):
+    environment = NavEnvironment(replace(config, num_envs=200, camera=None), homes)
+    state = environment.state
+    way, before = environment.find_ways(), environment.distance.clone()
+    torch.testing.assert_close(way.norm(dim=1), torch.ones(200))
+    c, s = state["yaw"].cos(), state["yaw"].sin()
+    ahead = torch.stack([c * way[:, 0] - s * way[:, 1], s * way[:, 0] + c * way[:, 1]], 1)
+    home, goal = state["home"].clone(), state["goal"].clone()
+    environment.place(home, goal, state["position"] + 0.2 * ahead, state["yaw"].clone())
+    nearer = before - environment.distance
+    assert (nearer > 0).float().mean() > 0.99  # around a corner the chord may touch where no way leads
+    assert nearer.mean() > 0.85 * 0.2

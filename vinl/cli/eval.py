@@ -32,7 +32,8 @@ class Options:
     """Files (.png, .pgm, ROS .yaml, ProcTHOR .json or .jsonl.gz:17) or names of shipped plans; all shipped ones by
     default."""
     loco: str | None = None
-    """Locomotor: a shipped policy's name, or a policy folder; rough by default."""
+    """Locomotor: a shipped policy's name, or a policy folder; by default the best that is shipped: loco, else
+    teacher, else rough."""
     nav: str | None = None
     """Navigator: oracle (follows the shortest way, the default), a shipped navigation policy's name, or a policy
     folder. With --table it takes the place of the learned navigator of all rows."""
@@ -119,13 +120,14 @@ def main(argv: list[str]) -> int:
 def _run_one(options: Options, out: Path, prepare: Callable[[], Protocol], workers: int, command: list[str]) -> None:
     from rich.console import Console
 
+    from vinl.evaluation.choosing import best_locomotor
     from vinl.evaluation.evaluate import evaluate_rows
     from vinl.evaluation.outputs import write_run
     from vinl.evaluation.summary import print_summary
 
     if options.rows or options.strict:
         raise InputError("--rows and --strict belong to a table; give --table too")
-    row = _load_row(options.loco or "rough", options.nav or "oracle", options.obstacles or "none", options)
+    row = _load_row(options.loco or best_locomotor(), options.nav or "oracle", options.obstacles or "none", options)
     protocol, console = prepare(), Console()
     with _progress(console, out) as progress:
         results = evaluate_rows([row], protocol, workers, [out], True, options.fresh, command, progress.show)[0]

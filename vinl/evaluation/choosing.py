@@ -13,6 +13,19 @@ BEST_FIRST = ("loco", "teacher", "rough")
 """Shipped locomotors, the one that is wanted most first."""
 
 
+def best_locomotor() -> str:
+    """Name of the shipped locomotor that is taken where none is named.
+
+    Raises:
+        InputError: none is shipped.
+    """
+    shipped = list_policies()
+    for name in BEST_FIRST:
+        if name in shipped:
+            return name
+    raise InputError("no locomotor is shipped with this version; give a policy folder")
+
+
 def choose_locomotor(locomotor: str | Path | Policy | None) -> Policy:
     """The policy itself, the one of that name, or the best shipped one.
 
@@ -20,10 +33,7 @@ def choose_locomotor(locomotor: str | Path | Policy | None) -> Policy:
         InputError: there is none, or it is no locomotor.
     """
     if locomotor is None:
-        shipped = list_policies()
-        locomotor = next((name for name in BEST_FIRST if name in shipped), None)
-        if locomotor is None:
-            raise InputError("no locomotor is shipped with this version; give a policy folder")
+        locomotor = best_locomotor()
     policy = load_policy(locomotor) if isinstance(locomotor, (str, Path)) else locomotor
     check_senses(policy)
     return policy

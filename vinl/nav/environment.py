@@ -16,6 +16,7 @@ from vinl.nav.home_store import HomeStore
 from vinl.nav.kernels import Robots, aim_cameras, measure_robots, move_robots, place_robots, render_interior
 from vinl.nav.measures import EpisodeEnd, Measures, end_episodes
 from vinl.nav.rules import write_rules
+from vinl.nav.way_kernel import point_ways
 from vinl.robot.cameras import Camera
 from vinl.sensing.depth import check_device
 
@@ -145,6 +146,13 @@ class NavEnvironment:
     def distance(self) -> Float[Tensor, " n"]:
         """Geodesic distance to the goal [m]; what the robots themselves do not know. Changes with the next step."""
         return self.state["distance"]
+
+    def find_ways(self) -> Float[Tensor, "n 2"]:
+        """Where the shortest way leads over the next 0.8 m: a unit vector in each robot's frame (forward, left), zero
+        at the goal. The robots themselves do not know it."""
+        way = self._zeros(self.num_envs, 2)
+        self._launch(point_ways, self.num_envs, [self.homes.homes, self._robots, wp.from_torch(way, dtype=wp.vec2)])
+        return way
 
     def read_measures(self) -> dict[str, float]:
         """Means over the episodes that ended since the last call (``success``, ``spl``, ``soft_spl``, ``collisions``,

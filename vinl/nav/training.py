@@ -33,6 +33,9 @@ from vinl.rl.run_folder import RunFolder
 _SEEDS_BETWEEN = 10_000_000
 """Each process has homes of its own: their seeds lie this far apart."""
 
+_WAY_SIZE = 2
+"""Numbers that tell where the shortest way leads."""
+
 _RATE_DOWN, _RATE_UP = 1.5, 1.1
 """The adaptive learning rate moves by these once an update; rsl-rl's 1.5 both ways when it moves at each minibatch."""
 
@@ -112,7 +115,7 @@ def train_navigator(
 
     loop = PeerLoop(
         peers,
-        NavTrainingEnv(environment, config.network.privileged, peers),
+        NavTrainingEnv(environment, config.network.privileged, config.ppo.way > 0, peers),
         algorithm,
         config.ppo.steps,
         peer_folder(run, peers),
@@ -199,7 +202,12 @@ def build_algorithm(
     if weights is not None:
         actor.load_state_dict(weights)
     model = RecurrentActorCritic(
-        actor, p.log_std, p.log_std_range, privileged=int(config.network.privileged), values=config.network.values
+        actor,
+        p.log_std,
+        p.log_std_range,
+        privileged=int(config.network.privileged),
+        values=config.network.values,
+        guesses=_WAY_SIZE if p.way else 0,
     ).to(device)
     storage = RecurrentStorage(
         p.steps,
@@ -211,6 +219,7 @@ def build_algorithm(
         ACTION_SIZE,
         actor.initial_state(config.num_envs, device),
         device,
+        hidden=_WAY_SIZE if p.way else 0,
     )
     low, high = p.rate_limits(0.0)
     rate = DeviceRate(
@@ -230,6 +239,7 @@ def build_algorithm(
         clip=p.clip,
         value=p.value,
         entropy=p.entropy,
+        guess=p.way,
         max_grad_norm=p.max_grad_norm,
         bf16=p.bf16,
         compiled=p.compiled,

@@ -17,11 +17,14 @@ class NavTrainingEnv:
     Args:
         environment: the robots of this process.
         privileged: whether observations hold the geodesic distance, for the critic.
+        ways: whether they hold where the shortest way leads, for the network to guess.
         peers: the processes of the training.
     """
 
-    def __init__(self, environment: NavEnvironment, privileged: bool = False, peers: Peers | None = None) -> None:
-        self.environment, self._privileged = environment, privileged
+    def __init__(
+        self, environment: NavEnvironment, privileged: bool = False, ways: bool = False, peers: Peers | None = None
+    ) -> None:
+        self.environment, self._privileged, self._ways = environment, privileged, ways
         self.num_envs = environment.num_envs * (peers.count if peers else 1)
 
     def get_observations(self) -> TensorDict:
@@ -53,4 +56,6 @@ class NavTrainingEnv:
             seen["depth"] = depth
         if self._privileged:
             seen["privileged"] = self.environment.state["distance"][:, None] / DISTANCE_UNIT
+        if self._ways:
+            seen["hidden"] = self.environment.find_ways()
         return TensorDict(seen, batch_size=[len(vector)])

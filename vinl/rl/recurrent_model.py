@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, cast
+from typing import Any, NamedTuple, Protocol, cast
 
 import torch
 from jaxtyping import Bool, Float
@@ -38,8 +38,25 @@ class MemoryActor(Protocol):
         ...
 
 
+class Outlook(NamedTuple):
+    """What the model makes of t steps.
+
+    Attributes:
+        mean: (t, n, a) of the actions.
+        value: (t, n).
+        state: the memory after the last step.
+        guess: (t, n, g) of what is hidden from the robots; g is 0 where nothing is to be guessed.
+    """
+
+    mean: Float[Tensor, "t n a"]
+    value: Float[Tensor, "t n"]
+    state: State
+    guess: Float[Tensor, "t n g"]
+
+
 class RecurrentActorCritic(nn.Module):
-    """Shared trunk, two heads: the actor's mean and the value. The actions' spread does not depend on the state.
+    """Shared trunk and heads: the actor's mean, the value, and guesses at what is hidden. The actions' spread does not
+    depend on the state.
 
     Args:
         actor: a ``MemoryActor``.
@@ -47,6 +64,7 @@ class RecurrentActorCritic(nn.Module):
         log_std_range: it is held within these.
         privileged: numbers that only the critic sees.
         values: width of a layer between feature and value; 0: none.
+        guesses: hidden numbers that the feature is to tell.
     """
 
     _log_std_range: Tensor
@@ -58,6 +76,7 @@ class RecurrentActorCritic(nn.Module):
         log_std_range: tuple[float, float] = (-2.0, 0.2),
         privileged: int = 0,
         values: int = 0,
+        guesses: int = 0,
     ) -> None:
         super().__init__()
         self.actor = actor
@@ -68,6 +87,7 @@ class RecurrentActorCritic(nn.Module):
         width = cast(MemoryActor, actor).feature_size + privileged
         self.value = nn.Sequential(*([nn.Linear(width, values), nn.ELU()] if values else []))
         self.value.append(nn.Linear(values or width, 1))
+        self.guess = nn.Linear(cast(MemoryActor, actor).feature_size, guesses) if guesses else None
         for layer in self.value:
             if isinstance(layer, nn.Linear):
                 nn.init.orthogonal_(layer.weight)
@@ -80,14 +100,15 @@ class RecurrentActorCritic(nn.Module):
         state: State,
         fresh: Bool[Tensor, "t n"],
         privileged: Float[Tensor, "t n p"] | None = None,
-    ) -> tuple[Float[Tensor, "t n a"], Float[Tensor, "t n"], State]:
-        """Mean actions and values of t steps, and the last state; images in [0, 1] or as bytes."""
+    ) -> Outlook:
+        """What is made of t steps; images in [0, 1] or as bytes."""
         actor = cast(MemoryActor, self.actor)
         feature, state = actor.look(as_unit(depth), vector, state, fresh)
         feature = feature.float()
         with torch.autocast(feature.device.type, enabled=False):
             seen = feature if privileged is None else torch.cat([feature, privileged.float()], -1)
-            return actor.choose(feature), self.value(seen)[..., 0], state
+            guess = feature[..., :0] if self.guess is None else self.guess(feature)
+            return Outlook(actor.choose(feature), self.value(seen)[..., 0], state, guess)
 
     @torch.no_grad()
     def hold_spread(self) -> None:

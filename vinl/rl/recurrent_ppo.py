@@ -24,7 +24,7 @@ from vinl.rl.recurrent_storage import RecurrentStorage
 from vinl.rl.step_graph import StepGraph
 
 _LOG_2PI = math.log(2.0 * math.pi)
-_SUMS = ("surrogate", "value", "entropy", "kl", "clipped", "gradient_norm")
+_SUMS = ("surrogate", "value", "entropy", "guess", "kl", "clipped", "gradient_norm")
 """What is added up on the device over an update."""
 
 
@@ -38,6 +38,7 @@ class RecurrentPpoSettings:
         clip: of the probability ratio and of the value.
         value: weight of the value loss.
         entropy: weight of the entropy bonus.
+        guess: weight of the squared error of the guesses at what is hidden.
         max_grad_norm: gradients are clipped to this norm.
         reward_scale: rewards are multiplied by this.
         bf16: images in bfloat16 (GPU only).
@@ -53,6 +54,7 @@ class RecurrentPpoSettings:
     clip: float = 0.2
     value: float = 0.5
     entropy: float = 0.003
+    guess: float = 0.0
     max_grad_norm: float = 0.5
     reward_scale: float = 1.0
     bf16: bool = True
@@ -65,7 +67,7 @@ class RecurrentPPO:
     """Learns from roll-outs of a ``RecurrentActorCritic``.
 
     Observations are a ``TensorDict`` with ``vector`` (n, k), ``depth`` (n, H, W) in [0, 1] unless the actor is blind,
-    and ``privileged`` (n, p) if the critic takes it.
+    ``privileged`` (n, p) if the critic takes it, and ``hidden`` (n, g) if the feature is to tell it.
 
     Args:
         model: actor and critic, on the device.
@@ -129,10 +131,10 @@ class RecurrentPPO:
         depth, privileged = self._keep(observation, t)
         st.fresh[t] = self._fresh
         with torch.no_grad(), self._precision():
-            mean, value, state = self.model(depth, st.vector[t][None], self._state, self._fresh[None], privileged)
-        self._remember(state)
-        mean, noise = mean[0], torch.randn_like(mean[0])
-        st.means[t], st.values[t] = mean, value[0]
+            seen = self.model(depth, st.vector[t][None], self._state, self._fresh[None], privileged)
+        self._remember(seen.state)
+        mean, noise = seen.mean[0], torch.randn_like(seen.mean[0])
+        st.means[t], st.values[t] = mean, seen.value[0]
         torch.addcmul(mean, noise, st.log_std.exp(), out=st.actions[t])
         st.log_prob[t] = _log_prob(st.actions[t], mean, st.log_std)
         return st.actions[t]
@@ -155,8 +157,8 @@ class RecurrentPPO:
         depth = st.as_stored(observation["depth"])[None] if st.depth is not None else None
         privileged = observation["privileged"][None] if st.privileged is not None else None
         with torch.no_grad(), self._precision():
-            _, value, _ = self.model(depth, observation["vector"][None], self._state, self._fresh[None], privileged)
-        st.estimate_advantages(value[0], s.gamma, s.lam)
+            seen = self.model(depth, observation["vector"][None], self._state, self._fresh[None], privileged)
+        st.estimate_advantages(seen.value[0], s.gamma, s.lam)
         mean = st.advantages.mean()
         self.peers.average(mean)
         square = (st.advantages - mean).square().mean()
@@ -235,6 +237,8 @@ class RecurrentPPO:
         if st.privileged is not None:
             st.privileged[t] = observation["privileged"]
             privileged = st.privileged[t][None]
+        if st.hidden is not None:
+            st.hidden[t] = observation["hidden"]
         return depth, privileged
 
     def _remember(self, state: tuple[Tensor, ...]) -> None:
@@ -249,7 +253,7 @@ class RecurrentPPO:
         s, st, model = self.settings, self.storage, self.model
         batch = st.take(robots)
         with self._precision():
-            mean, value, _ = model(batch.depth, batch.vector, batch.state, batch.fresh, batch.privileged)
+            mean, value, _, guess = model(batch.depth, batch.vector, batch.state, batch.fresh, batch.privileged)
         log_std = model.log_std
         log_ratio = _log_prob(batch.actions, mean, log_std) - batch.log_prob
         ratio = log_ratio.exp()
@@ -258,7 +262,10 @@ class RecurrentPPO:
         near = batch.values + (value - batch.values).clamp(-s.clip, s.clip)
         value_loss = torch.max((value - batch.returns).square(), (near - batch.returns).square()).mean()
         entropy = (log_std + 0.5 * (1.0 + _LOG_2PI)).sum()
-        loss = surrogate + s.value * value_loss - self._entropy * entropy
+        guess_loss = torch.zeros_like(entropy)
+        if batch.hidden is not None:
+            guess_loss = (guess - batch.hidden).square().mean()
+        loss = surrogate + s.value * value_loss - self._entropy * entropy + s.guess * guess_loss
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         self.peers.average_gradients(model.parameters())
@@ -269,7 +276,7 @@ class RecurrentPPO:
             kl = _divergence(batch.means, st.log_std, mean, log_std).mean()
             clipped = (bounded != ratio).float().mean()
             self._kl += kl
-            self._sums += torch.stack([surrogate, value_loss, entropy, kl, clipped, norm])
+            self._sums += torch.stack([surrogate, value_loss, entropy, guess_loss, kl, clipped, norm])
             if s.adapt_each:
                 self.peers.average(kl)
                 self.rate.steer(kl)

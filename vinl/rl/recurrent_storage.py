@@ -28,6 +28,7 @@ class Minibatch(NamedTuple):
     values: Tensor
     advantages: Tensor
     returns: Tensor
+    hidden: Tensor | None
 
 
 class RecurrentStorage:
@@ -37,7 +38,7 @@ class RecurrentStorage:
         steps, robots: t and n.
         image: (height, width) of the images, or None.
         image_type: a key of ``IMAGE_TYPES``.
-        vector, privileged, actions: sizes; ``privileged`` 0: there is none.
+        vector, privileged, actions, hidden: sizes; ``privileged``, ``hidden`` 0: there is none.
         state: of the robots at the start; its shapes are taken.
         device: where the buffers lie.
     """
@@ -53,6 +54,7 @@ class RecurrentStorage:
         actions: int,
         state: State,
         device: torch.device | str,
+        hidden: int = 0,
     ) -> None:
         def room(*size: int, dtype: torch.dtype = torch.float32) -> Tensor:
             return torch.zeros(steps, robots, *size, dtype=dtype, device=device)
@@ -61,6 +63,7 @@ class RecurrentStorage:
         self.depth = room(*image, dtype=IMAGE_TYPES[image_type]) if image else None
         self.vector, self.actions, self.means = room(vector), room(actions), room(actions)
         self.privileged = room(privileged) if privileged else None
+        self.hidden = room(hidden) if hidden else None
         self.fresh, self.done = room(dtype=torch.bool), room(dtype=torch.bool)
         self.log_prob, self.values, self.rewards = room(), room(), room()
         self.advantages, self.returns = room(), room()
@@ -110,4 +113,5 @@ class RecurrentStorage:
             values=pick(self.values),
             advantages=pick(self.advantages),
             returns=pick(self.returns),
+            hidden=None if self.hidden is None else pick(self.hidden),
         )
