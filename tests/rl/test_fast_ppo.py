@@ -8,9 +8,11 @@ import pytest
 import torch
 from rsl_rl.algorithms import PPO
 from rsl_rl.env import VecEnv
+from rsl_rl.modules.distribution import GaussianDistribution
 from tensordict import TensorDict
 
 from vinl.rl.fast_ppo import FastPPO
+from vinl.rl.models import UncheckedGaussian
 
 N, STEPS, SIZE, ACTIONS = 16, 6, 5, 3
 
@@ -122,3 +124,13 @@ def test_either_goes_on_from_the_others_state():
 def test_what_it_does_not_know_is_refused():
     with pytest.raises(ValueError, match="mixed precision"):
         build("vinl.rl.fast_ppo:FastPPO", NoiseEnv(), use_mixed_precision=True)
+
+
+def test_actions_are_drawn_as_rsl_rl_draws_them():
+    mean, drawn = torch.randn(500, 12), []
+    for kind in (GaussianDistribution, UncheckedGaussian):
+        torch.manual_seed(4)
+        distribution = kind(12, init_std=0.3)
+        distribution.update(mean)
+        drawn.append(distribution.sample())
+    assert torch.equal(*drawn) and not drawn[1].requires_grad

@@ -41,7 +41,7 @@ def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
             **sight,
             "hidden_dims": list(p.actor),
             "activation": "elu",
-            "distribution_cfg": {"class_name": "GaussianDistribution", "init_std": p.init_std},
+            "distribution_cfg": {"class_name": "vinl.rl.models:UncheckedGaussian", "init_std": p.init_std},
         },
         "critic": {"class_name": "MLPModel", "hidden_dims": list(p.critic), "activation": "elu"},
         "algorithm": {

@@ -1,6 +1,6 @@
 """The Warp kernel that tells where the shortest way leads. A file of its own: Warp compiles it."""
 
-# ruff: noqa: UP018, RUF046 - a variable of a kernel that changes must be made by its type
+
 # pyright: reportInvalidTypeForm=false, reportCallIssue=false, reportArgumentType=false
 # pyright: reportOperatorIssue=false, reportIndexIssue=false, reportAttributeAccessIssue=false
 

@@ -7,11 +7,23 @@ from typing import Any
 
 import torch
 from rsl_rl.models import MLPModel
+from rsl_rl.modules.distribution import GaussianDistribution
 from tensordict import TensorDict
 from torch import nn
 
 from vinl.policies.networks import BlindActor, MapActor, mlp
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE
+
+
+class UncheckedGaussian(GaussianDistribution):
+    """rsl-rl's actions, drawn without waiting for the device: ``torch.normal``, which rsl-rl draws with, reads back
+    whether every standard deviation is positive, at every control step and every minibatch, and cannot be recorded
+    into a CUDA graph."""
+
+    def sample(self) -> torch.Tensor:
+        """Actions (n, 12)."""
+        mean = self.mean.detach()
+        return mean + self.std.detach() * torch.randn_like(mean)
 
 
 class MapModel(MLPModel):
