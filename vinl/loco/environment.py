@@ -8,15 +8,16 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int, UInt8
+from jaxtyping import Array, Bool, Float, UInt8
 
-from vinl.loco.commands import DRAWS, between, draw_commands
+from vinl.loco.commands import DRAWS, draw_commands
 from vinl.loco.config import LocoConfig, RewardConfig
 from vinl.loco.curriculum import next_levels
 from vinl.loco.lost import KEPT, REASONS, Lost, keep_lost
-from vinl.loco.measures import MEASURES, TERMS, average_sums, sum_measures, tile_cover
+from vinl.loco.measures import TERMS, average_sums, sum_measures, tile_cover
 from vinl.loco.rewards import Motion, reward_terms
 from vinl.loco.simulation import Body, Contacts, Ground, Simulation
+from vinl.loco.state import State, count_steps, first_state, start_body, strip_weak_types
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
 from vinl.robot.observation import CLIP, NOISE, OBSERVATION_SIZE, observe
 from vinl.robot.rotation import rotate_inverse
@@ -31,45 +32,6 @@ MAX_SPEED = 150.0
 
 _UPSIDE = -0.3
 """Third component of the gravity vector in the trunk above which the robot has fallen: tilted by more than 72 deg."""
-
-
-class State(NamedTuple):
-    """Everything that changes, one row a robot. It is saved with every checkpoint.
-
-    Attributes:
-        key: random state.
-        body: physics.
-        action: (n, 12) last one.
-        command: (n, 3); command_left: (n,) steps until the next.
-        push_left: (n,) steps until the next push.
-        step: (n,) of the episode, from a random one at first; life: (n,) steps since the start, -1 where the
-            observation is not finite.
-        air_time: (n, 4) [s]; touched: (n, 4) feet on the ground in the last step.
-        way, commanded: (n,) progress along the commands and what they asked for [m].
-        hits: (n,) steps of the episode with a foot or shank on a block.
-        level, column: (n,) tile.
-        friction, added_mass: (n,) of the robot.
-        sums: (m,) of ``MEASURES`` and of the reward terms since they were last read.
-    """
-
-    key: Array
-    body: Body
-    action: Float[Array, "n 12"]
-    command: Float[Array, "n 3"]
-    command_left: Int[Array, " n"]
-    push_left: Int[Array, " n"]
-    step: Int[Array, " n"]
-    life: Int[Array, " n"]
-    air_time: Float[Array, "n 4"]
-    touched: Bool[Array, "n 4"]
-    way: Float[Array, " n"]
-    commanded: Float[Array, " n"]
-    hits: Float[Array, " n"]
-    level: Int[Array, " n"]
-    column: Int[Array, " n"]
-    friction: Float[Array, " n"]
-    added_mass: Float[Array, " n"]
-    sums: Float[Array, " m"]
 
 
 class StepResult(NamedTuple):
@@ -107,7 +69,7 @@ class LocoEnvironment:
         self.num_envs = config.num_envs
         self.terrain = build_terrain(config.terrain)
         self.simulation = Simulation(self.terrain.ground, config.kp, config.kd, self.terrain.blocks)
-        self.episode_steps = round(config.episode_length / CONTROL_DT)
+        self.episode_steps = count_steps(config)
         device = jax.devices()[0]
         self._starts = jax.device_put(jnp.asarray(self.terrain.starts, jnp.float32), device)
         frame = self.simulation.frame
@@ -163,55 +125,10 @@ class LocoEnvironment:
             for k in range(min(total, KEPT))
         ]
 
-    # ---- starts ---------------------------------------------------------------------------------------------------
-
-    def _start_body(self, level: Array, column: Array, u: Float[Array, "n 22"]) -> Body:
-        """Robots near the middle of their tiles, any heading, joints and velocities a little off."""
-        c, n, s = self.config.randomisation, self.num_envs, 2 * u - 1
-        middle, yaw, zero = self._starts[level, column], s[:, 2] * jnp.pi, jnp.zeros(n)
-        qpos = jnp.concatenate(
-            [
-                middle[:, :2] + s[:, :2] * c.start_xy,
-                middle[:, 2:] + c.start_height,
-                jnp.stack([jnp.cos(yaw / 2), zero, zero, jnp.sin(yaw / 2)], 1),
-                jnp.asarray(DEFAULT_POSE, jnp.float32) * (1 + c.start_joints * s[:, 3:15]),
-            ],
-            1,
-        )
-        qvel = jnp.concatenate([c.start_velocity * s[:, 15:21], jnp.zeros((n, 12))], 1)
-        return Body(qpos, qvel, jnp.zeros((n, 18)))
+    # ---- inside ---------------------------------------------------------------------------------------------------
 
     def _first_state(self, key: Array) -> State:
-        c, n = self.config, self.num_envs
-        key, draw = jax.random.split(key)
-        u = jax.random.uniform(draw, (n, 40))
-        highest = min(c.curriculum.first_level, c.terrain.levels - 1)
-        level = (u[:, 30] * (highest + 1)).astype(jnp.int32)
-        column = (jnp.arange(n) % c.terrain.columns).astype(jnp.int32)
-        command, left = draw_commands(c.commands, u[:, 22 : 22 + DRAWS])
-        state = State(
-            key=key,
-            body=self._start_body(level, column, u[:, :22]),
-            action=jnp.zeros((n, 12)),
-            command=command,
-            command_left=left,
-            push_left=(u[:, 31] * c.randomisation.push_interval / CONTROL_DT).astype(jnp.int32),
-            step=(u[:, 32] * self.episode_steps).astype(jnp.int32),
-            life=jnp.zeros(n, jnp.int32),
-            air_time=jnp.zeros((n, 4)),
-            touched=jnp.zeros((n, 4), bool),
-            way=jnp.zeros(n),
-            commanded=jnp.zeros(n),
-            hits=jnp.zeros(n),
-            level=level,
-            column=column,
-            friction=between(c.randomisation.friction, u[:, 33]),
-            added_mass=between(c.randomisation.added_mass, u[:, 34]),
-            sums=jnp.zeros(len(MEASURES) + len(TERMS)),
-        )
-        return _strong(state)
-
-    # ---- one step -------------------------------------------------------------------------------------------------
+        return first_state(self.config, self._starts, key)
 
     def _observations(self, ground: Ground, state: State) -> tuple[Float[Array, "n 235"], Float[Array, "n 235"]]:
         """With noise and without. The noise is the state's own, so that a state that is loaded observes the same."""
@@ -286,7 +203,7 @@ class LocoEnvironment:
         shove = c.randomisation.push_speed * (2 * u[:, 36:38] - 1)
         body = body._replace(qvel=jnp.where(push[:, None], body.qvel.at[:, :2].set(shove), body.qvel))
         level = jnp.where(done, level, old.level)
-        fresh = self._start_body(level, old.column, u[:, :22])
+        fresh = start_body(c.randomisation, self._starts, level, old.column, u[:, :22])
         command, left = draw_commands(c.commands, u[:, 22 : 22 + DRAWS])
         renew = done | (old.command_left <= 0)
 
@@ -313,7 +230,7 @@ class LocoEnvironment:
             added_mass=old.added_mass,
             sums=old.sums + sums,
         )
-        state = _strong(state)
+        state = strip_weak_types(state)
         noisy, exact = self._observations(ground, state)
         blind = ~jnp.isfinite(exact.sum(1))
         noisy, exact = (jnp.where(blind[:, None], 0.0, x) for x in (noisy, exact))
@@ -346,8 +263,3 @@ class LocoEnvironment:
             fallen=contacts.trunk_down | (gravity[:, 2] > _UPSIDE) | broken,
         )
         return motion, touching
-
-
-def _strong(state: State) -> State:
-    """No weak types: with them the step would compile twice."""
-    return jax.tree.map(lambda x: x.astype(x.dtype), state)

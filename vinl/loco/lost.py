@@ -65,7 +65,7 @@ def keep_lost(lost: Lost, wrong: Bool[Array, "reasons n"], state: Any, action: F
     Args:
         lost: those before.
         wrong: what went wrong with whom, in the order of ``REASONS``.
-        state: ``environment.State`` before the step.
+        state: ``state.State`` before the step.
         action: of the step, as the policy gave it.
     """
     gone, n = wrong.any(0), wrong.shape[1]
