@@ -2,8 +2,9 @@
 
 import pytest
 
-from vinl.nav.config import CameraConfig, HomesConfig, NavConfig
+from vinl.nav.config import HomesConfig, NavConfig
 from vinl.nav.home_store import HomeStore
+from vinl.nav.robot_config import CameraConfig
 from vinl.world.readers import load_floorplan
 
 

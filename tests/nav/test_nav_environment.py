@@ -93,7 +93,7 @@ def test_a_cancelled_step_is_seen_unless_the_paper_asks(config, homes, previous)
 def test_the_motion_seen_is_what_the_poses_say(config, homes):
     """The chain measures the same from the poses of the robot's trunk (``vinl.evaluation.odometry``)."""
     from vinl.evaluation.odometry import measure_twist
-    from vinl.nav.config import ExecutionConfig
+    from vinl.nav.robot_config import ExecutionConfig
 
     execution = ExecutionConfig(lag=0.1, speed_gain=(0.8, 1.0), yaw_noise=0.2, speed_noise=0.1, side_slip=0.1)
     environment = NavEnvironment(replace(config, num_envs=200, camera=None, execution=execution), homes)

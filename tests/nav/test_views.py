@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import torch
 
-from vinl.nav.config import CameraConfig, EpisodeConfig, ExecutionConfig, MotionConfig, RewardConfig, ViewConfig
+from vinl.nav.config import EpisodeConfig, RewardConfig
 from vinl.nav.environment import NavEnvironment
+from vinl.nav.robot_config import CameraConfig, ExecutionConfig, MotionConfig, ViewConfig
 from vinl.sensing.depth import DepthCamera
 from vinl.world.mesh import floorplan_mesh
 from vinl.world.readers import load_floorplan

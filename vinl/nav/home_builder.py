@@ -13,8 +13,9 @@ from jaxtyping import Float, Int
 from scipy.ndimage import label
 
 from vinl.config.errors import InputError
-from vinl.nav.config import CameraConfig, ClutterConfig, NavConfig
+from vinl.nav.config import ClutterConfig, NavConfig
 from vinl.nav.fields import measure_near_clearance, spread_fields
+from vinl.nav.robot_config import CameraConfig
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import RESOLUTION, FloorPlan

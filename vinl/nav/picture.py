@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from PIL import Image, ImageDraw
 
-from vinl.nav.config import RobotConfig
 from vinl.nav.home_store import HomeRecord
+from vinl.nav.robot_config import RobotConfig
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 
