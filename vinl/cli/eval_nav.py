@@ -63,13 +63,12 @@ def main(argv: list[str]) -> int:
         write_json,
         write_text,
     )
-    from vinl.nav.evaluation import (
-        END_REASONS,
+    from vinl.nav.evaluation import END_REASONS, evaluate_kind
+    from vinl.nav.evaluation_setup import (
         NavEvaluation,
         build_homes,
         describe_episodes,
         describe_policy,
-        evaluate_kind,
         load_navigator,
     )
     from vinl.nav.measures import STUCK

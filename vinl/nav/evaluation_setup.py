@@ -1,0 +1,187 @@
+"""The rules of a navigator's evaluation, and what they are carried out with: the navigator, the environment's
+configuration, the homes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from vinl.config.errors import InputError
+from vinl.config.loader import build_config, load_config
+from vinl.nav.config import EpisodeConfig, NavConfig
+from vinl.nav.robot_config import CameraConfig
+from vinl.nav.home_store import HomeStore
+from vinl.policies.card import PolicyCard, find_previous
+from vinl.policies.depth_policy import DepthPolicy
+from vinl.policies.io import load_policy
+from vinl.world.readers import expand_paths, shipped_floorplans
+
+MOTIONS = {
+    "walking": "nav/motion/walking",
+    "level": "nav/motion/level",
+    "steady": "nav/motion/steady",
+    "paper": "nav/paper",
+}
+"""How camera and robot move, and the config that says it: as recorded from the walking robot on clutter or on level
+ground, not at all, or redrawn at each step [paper]."""
+
+ORACLE = "oracle"
+
+
+@dataclass(frozen=True)
+class NavEvaluation:
+    """The rules.
+
+    Attributes:
+        episodes: of each kind of home.
+        seed: of starts, goals, headings and the camera's motion.
+        motion: a key of ``MOTIONS``.
+        distance: range of the geodesic distance at the start [m].
+        steps: an episode ends after so many decisions of 0.5 s [paper code: 250].
+        goals: in each home.
+        clutter: share of the homes with blocks that are seen but stop no robot.
+        start_clearance: starts keep this distance from walls and furniture [m]; the rectangle turns on the spot with
+            0.36 m, and starts lie up to 0.07 m off the cells' centres. In ``vinl eval`` it is 0.5 m [paper].
+    """
+
+    episodes: int = 1000
+    seed: int = 0
+    motion: str = "walking"
+    distance: tuple[float, float] = (5.0, 30.0)
+    steps: int = 250
+    goals: int = 8
+    clutter: float = 0.0
+    start_clearance: float = 0.45
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.episodes <= 65536:
+            raise InputError(f"--episodes must lie between 1 and 65536, got {self.episodes}")
+        if not 0 <= self.seed < 2**31:
+            raise InputError(f"--seed must lie between 0 and 2147483647, got {self.seed}")
+        if self.motion not in MOTIONS:
+            raise InputError(f"--motion must be one of {', '.join(MOTIONS)}, got {self.motion!r}")
+        if not 0 <= self.clutter <= 1:
+            raise InputError(f"--clutter must lie between 0 and 1, got {self.clutter:g}")
+        if self.steps < 1:
+            raise InputError(f"--steps must be at least 1, got {self.steps}")
+
+
+def load_navigator(name: str, device: str) -> DepthPolicy | None:
+    """A trained navigator, or None for the oracle.
+
+    Raises:
+        InputError: there is no such policy, or it is no navigator.
+    """
+    if name == ORACLE:
+        return None
+    policy = load_policy(name, device)
+    if not isinstance(policy, DepthPolicy) or policy.card.kind != "navigation":
+        raise InputError(f"--policy {name}: a {policy.card.kind} policy; give a navigator, or oracle")
+    return policy
+
+
+def name_kind(path: str) -> str:
+    """What kind of floor plan a path leads to, for the tables: the file's stem where it holds many."""
+    if path in shipped_floorplans():
+        return "shipped"
+    file = re.sub(r":\d+$", "", path).lower()
+    for kind, endings in (("ros_map", (".yaml", ".yml")), ("picture", (".png", ".pgm"))):
+        if file.endswith(endings):
+            return kind
+    return Path(file).name.split(".")[0]
+
+
+def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfig:
+    """The environment of an evaluation: the policy's camera and memory of its last step, the motion and execution of
+    ``rules.motion``. The walking robot carries the camera as high as it walks, whatever the training took.
+
+    Args:
+        card: of the navigator; None: blind (the oracle).
+        rules: of the evaluation.
+    """
+    config = load_config(NavConfig, MOTIONS[rules.motion])
+    camera = None
+    if card is not None and card.camera is not None:
+        trained = card.training.get("camera") or {}
+        known = {k: card.camera[k] for k in ("pitch_down", "hfov", "width", "height", "far")}
+        assert config.camera is not None
+        mount = {"mount_height": config.camera.mount_height}
+        if rules.motion == "paper" and "mount_height" in trained:
+            mount = {"mount_height": trained["mount_height"]}
+        camera = build_config(CameraConfig, {**known, "forward": card.camera["position"][0], **mount}, source="card")
+    episodes: EpisodeConfig = replace(
+        config.episodes, distance=rules.distance, steps=rules.steps, start_speed=(0.0, 0.0)
+    )
+    homes = replace(
+        config.homes,
+        goals=rules.goals,
+        starts=512,
+        start_clearance=rules.start_clearance,
+        fresh=0.0,
+        plans=(),
+        plans_share=0.0,
+    )
+    return replace(
+        config,
+        num_envs=rules.episodes,
+        seed=rules.seed,
+        previous="action" if card is None else find_previous(card),
+        camera=camera,
+        episodes=episodes,
+        homes=homes,
+        clutter=replace(config.clutter, share=rules.clutter),
+    )
+
+
+def build_homes(
+    config: NavConfig,
+    count: int,
+    homes_seed: int,
+    plans: Sequence[str],
+    device: str,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, HomeStore]:
+    """Homes by kind.
+
+    Args:
+        config: of the environment.
+        count: generated homes; 0: none.
+        homes_seed: of the first one; training starts from seed 1, so choose one far above its number of homes.
+        plans: floor plans, see ``vinl.world.readers.expand_paths``.
+        device: for the homes.
+        progress: called with homes done and wanted, of each kind anew.
+
+    Raises:
+        InputError: there are no homes, or none of a kind can be used.
+    """
+    stores: dict[str, HomeStore] = {}
+    if count:
+        generated = replace(config, homes=replace(config.homes, count=count, seed=homes_seed))
+        stores["generated"] = HomeStore.build(generated, device, progress)
+    groups: dict[str, list[str]] = {}
+    for path in expand_paths(plans):
+        groups.setdefault(name_kind(path), []).append(path)
+    for kind, paths in groups.items():
+        own = replace(config, homes=replace(config.homes, seed=homes_seed))
+        stores[kind] = HomeStore.from_paths(paths, own, device, progress=progress)
+    if not stores:
+        raise InputError("there are no homes: give --homes N or --floorplans FILE")
+    return stores
+
+
+def describe_policy(policy: DepthPolicy | None) -> dict[str, Any]:
+    """What the results say of a navigator."""
+    if policy is None:
+        return {"name": ORACLE}
+    card = policy.card
+    homes = card.training.get("homes", {})
+    return {
+        "name": card.name,
+        "samples": card.samples,
+        "commit": card.commit,
+        "camera": card.camera,
+        "trained_in": {k: homes[k] for k in ("count", "seed", "plans", "plans_share") if k in homes},
+    }
