@@ -13,31 +13,17 @@ from torch import Tensor
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
 from vinl.nav.home_store import HomeStore
-from vinl.nav.kernels import Robots, aim_cameras, measure_robots, move_robots, place_robots, render_interior
 from vinl.nav.measures import EpisodeEnd, Measures, end_episodes
+from vinl.nav.motion_kernels import measure_robots, move_robots, place_robots
+from vinl.nav.robots import make_robots
 from vinl.nav.rules import write_rules
+from vinl.nav.view_kernels import aim_cameras, render_interior
 from vinl.nav.way_kernel import point_ways
 from vinl.robot.cameras import Camera
 from vinl.sensing.depth import check_device
 
 DISTANCE_UNIT = 5.0
 """The observation holds the distance to the goal in this unit [m]."""
-
-_STATE = {
-    "home": (torch.int32, (), None),
-    "generation": (torch.int32, (), None),
-    "goal": (torch.int32, (), None),
-    "position": (torch.float32, (2,), wp.vec2),
-    "yaw": (torch.float32, (), None),
-    "speed": (torch.float32, (), None),
-    "yaw_rate": (torch.float32, (), None),
-    "distance": (torch.float32, (), None),
-    "gain": (torch.float32, (4,), wp.vec4),
-    "mount": (torch.float32, (4,), wp.vec4),
-    "amplitude": (torch.float32, (), None),
-    "sway": (torch.float32, (3,), wp.vec3),
-    "previous": (torch.float32, (2,), wp.vec2),
-}
 
 
 class NavStep(NamedTuple):
@@ -79,7 +65,7 @@ class NavEnvironment:
         num_envs: robots.
         camera: its record, or None if the robots are blind.
         ended: figures of the episodes that ended in the last step, see ``EpisodeEnd``; None before the first.
-        state: the robots' tensors by name, see ``kernels.Robots``; to be read.
+        state: the robots' tensors by name, see ``robots.Robots``; to be read.
 
     Raises:
         InputError: the device is not there, or not the homes'.
@@ -95,10 +81,7 @@ class NavEnvironment:
         self.num_envs = n = config.num_envs
         self.camera: Camera | None = None if config.camera is None else config.camera.record()
         self._rules = write_rules(config)
-        self.state = {name: self._zeros(n, *shape, dtype=dtype) for name, (dtype, shape, _) in _STATE.items()}
-        self._robots = Robots()
-        for name, (_, _, vector) in _STATE.items():
-            setattr(self._robots, name, wp.from_torch(self.state[name], dtype=vector))
+        self.state, self._robots = make_robots(n, self.device)
         counts = ("steps", "path", "collisions", "in_a_row", "start_distance", "unplaced")
         self.state |= {name: self._zeros(n) for name in counts}
         self.state["action"] = self._zeros(n, 2)

@@ -13,9 +13,9 @@ import warp as wp
 
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
+from vinl.nav.grids import Homes
 from vinl.nav.home_builder import BuiltHome, prepare_home
 from vinl.nav.home_stream import HomeStream, build_plans, count_workers
-from vinl.nav.kernels import Homes
 from vinl.sensing.depth import check_device
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers import check_file, expand_paths

@@ -7,11 +7,11 @@ from typing import Any
 import warp as wp
 
 from vinl.nav.config import NavConfig
-from vinl.nav.kernels import Rules
+from vinl.nav.motion_kernels import Rules
 
 
 def write_rules(config: NavConfig) -> Any:
-    """The record of ``kernels.Rules``."""
+    """The record of ``motion_kernels.Rules``."""
     robot, episodes, execution, motion, view = (
         config.robot,
         config.episodes,

@@ -8,7 +8,8 @@ from typing import no_type_check
 
 import warp as wp
 
-from vinl.nav.kernels import Homes, Robots, read_distance
+from vinl.nav.grids import Homes, read_distance
+from vinl.nav.robots import Robots
 from vinl.sensing.warp_start import start_warp
 
 start_warp()

@@ -1,4 +1,4 @@
-"""The Warp kernels of the navigation environment: one thread a robot, or a pixel. A file of their own: Warp compiles
+"""The Warp kernels that move robots and begin their episodes, one thread a robot. A file of their own: Warp compiles
 these functions, Python never runs them."""
 
 # ruff: noqa: UP018, RUF046 - a variable of a kernel that changes must be made by its type
@@ -9,53 +9,12 @@ from typing import no_type_check
 
 import warp as wp
 
-from vinl.sensing.kernels import look_through
+from vinl.nav.grids import FIELD, NOWHERE, Homes, read_distance, touches
+from vinl.nav.robots import Robots
 from vinl.sensing.warp_start import start_warp
 
 start_warp()
 wp.set_module_options({"enable_backward": False})
-
-FIELD = wp.constant(wp.float32(0.1))
-"""Side of a cell of the distance fields [m]; the clearance grid has two cells along it."""
-
-NOWHERE = wp.constant(wp.float32(1.0e9))
-"""Stands for a distance that is not known [m]."""
-
-
-@wp.struct
-@no_type_check
-class Homes:
-    """The grids of all homes, one after another; home h begins at cell ``first[h]`` (clearance: four times that)."""
-
-    first: wp.array(dtype=wp.int32)
-    shape: wp.array(dtype=wp.vec2i)
-    origin: wp.array(dtype=wp.vec2)
-    clearance: wp.array(dtype=wp.float16)
-    fields: wp.array(dtype=wp.float16, ndim=2)
-    goals: wp.array(dtype=wp.vec2, ndim=2)
-    starts: wp.array(dtype=wp.vec2, ndim=2)
-    generation: wp.array(dtype=wp.int32)
-    meshes: wp.array(dtype=wp.uint64)
-
-
-@wp.struct
-@no_type_check
-class Robots:
-    """The state of all robots."""
-
-    home: wp.array(dtype=wp.int32)
-    generation: wp.array(dtype=wp.int32)
-    goal: wp.array(dtype=wp.int32)
-    position: wp.array(dtype=wp.vec2)
-    yaw: wp.array(dtype=wp.float32)
-    speed: wp.array(dtype=wp.float32)
-    yaw_rate: wp.array(dtype=wp.float32)
-    distance: wp.array(dtype=wp.float32)
-    gain: wp.array(dtype=wp.vec4)  # of forward speed and yaw rate, yaw drift [rad/s], and factor on the noises
-    mount: wp.array(dtype=wp.vec4)  # roll, pitch, height of this episode's camera, height of the ceiling (0: none)
-    amplitude: wp.array(dtype=wp.float32)  # of this episode's sway
-    sway: wp.array(dtype=wp.vec3)  # roll, pitch and height within the episode, each of variance 1
-    previous: wp.array(dtype=wp.vec2)  # what the robot knows of its last step
 
 
 @wp.struct
@@ -99,85 +58,6 @@ class Rules:
     ceiling: wp.vec2
     noise: wp.float32
     dropout: wp.float32
-
-
-@wp.func
-@no_type_check
-def read_clearance(homes: Homes, home: wp.int32, p: wp.vec2) -> wp.float32:
-    """Clearance [m] between the cells' centres; 0 off the grid."""
-    rows = 2 * homes.shape[home][0]
-    columns = 2 * homes.shape[home][1]
-    u = 2.0 * (p[0] - homes.origin[home][0]) / FIELD
-    v = 2.0 * (p[1] - homes.origin[home][1]) / FIELD
-    j = wp.int32(wp.floor(u))
-    i = wp.int32(wp.floor(v))
-    if i < 0 or j < 0 or i + 1 >= rows or j + 1 >= columns:
-        return float(0.0)
-    a = v - wp.float32(i)
-    b = u - wp.float32(j)
-    at = 4 * homes.first[home] + i * columns + j
-    low = (1.0 - b) * wp.float32(homes.clearance[at]) + b * wp.float32(homes.clearance[at + 1])
-    at = at + columns
-    high = (1.0 - b) * wp.float32(homes.clearance[at]) + b * wp.float32(homes.clearance[at + 1])
-    return (1.0 - a) * low + a * high
-
-
-@wp.func
-@no_type_check
-def read_distance(homes: Homes, home: wp.int32, goal: wp.int32, p: wp.vec2) -> wp.float32:
-    """Distance to the goal [m], weighted over those of the four cells around that know it; else ``NOWHERE``."""
-    rows = homes.shape[home][0]
-    columns = homes.shape[home][1]
-    u = (p[0] - homes.origin[home][0]) / FIELD
-    v = (p[1] - homes.origin[home][1]) / FIELD
-    j = wp.int32(wp.floor(u))
-    i = wp.int32(wp.floor(v))
-    a = v - wp.float32(i)
-    b = u - wp.float32(j)
-    total = float(0.0)
-    weights = float(0.0)
-    for k in range(4):
-        di = k // 2
-        dj = k % 2
-        if i + di >= 0 and j + dj >= 0 and i + di < rows and j + dj < columns:
-            value = wp.float32(homes.fields[homes.first[home] + (i + di) * columns + j + dj, goal])
-            weight = wp.where(di == 1, a, 1.0 - a) * wp.where(dj == 1, b, 1.0 - b)
-            if wp.isfinite(value) and weight > 1.0e-6:
-                total = total + weight * value
-                weights = weights + weight
-    if weights > 0.0:
-        return total / weights
-    return NOWHERE
-
-
-@wp.func
-@no_type_check
-def touches(homes: Homes, home: wp.int32, p: wp.vec2, yaw: wp.float32, length: wp.float32, width: wp.float32) -> bool:
-    """Whether the robot's rectangle reaches a wall or furniture: five discs along it and one in each corner fill it
-    but for 2 cm at the corners."""
-    half = 0.5 * length
-    radius = 0.5 * width
-    middle = read_clearance(homes, home, p)
-    if middle * middle >= half * half + radius * radius:
-        return False
-    if middle < radius:
-        return True
-    along = wp.vec2(wp.cos(yaw), wp.sin(yaw))
-    side = wp.vec2(-along[1], along[0])
-    reach = half - radius
-    for k in range(2):
-        away = reach * (0.5 + 0.5 * wp.float32(k))
-        if read_clearance(homes, home, p + away * along) < radius:
-            return True
-        if read_clearance(homes, home, p - away * along) < radius:
-            return True
-    corner = 0.32 * radius
-    for k in range(4):
-        u = wp.where(k // 2 == 0, half - corner, corner - half)
-        v = wp.where(k % 2 == 0, radius - corner, corner - radius)
-        if read_clearance(homes, home, p + u * along + v * side) < corner:
-            return True
-    return False
 
 
 @wp.func
@@ -351,81 +231,3 @@ def place_robots(
     if wp.randf(state) < rules.ceiling_share:
         ceiling = mix(rules.ceiling, wp.randf(state))
     robots.mount[n] = wp.vec4(roll, pitch, height, ceiling)
-
-
-@wp.kernel
-@no_type_check
-def aim_cameras(
-    rules: Rules,
-    seed: wp.array(dtype=wp.int32),
-    robots: Robots,
-    position: wp.array(dtype=wp.vec3),
-    rotation: wp.array(dtype=wp.mat33),
-    holes: wp.array(dtype=wp.float32),
-):
-    """Where each camera is and where it looks in this step; the share of its pixels that read as the far limit."""
-    n = wp.tid()
-    state = wp.rand_init(seed[0] + 4 * seed[1] + 2, n)
-    mount = robots.mount[n]
-    sway = robots.amplitude[n] * robots.sway[n]
-    roll = mount[0] + rules.tilt_shake[0] * sway[0] + rules.tilt_uniform * (2.0 * wp.randf(state) - 1.0)
-    pitch = mount[1] + rules.tilt_shake[1] * sway[1] + rules.tilt_uniform * (2.0 * wp.randf(state) - 1.0)
-    height = rules.mount_height + mount[2] + rules.height_shake * sway[2]
-    yaw = robots.yaw[n]
-    cy = wp.cos(yaw)
-    sy = wp.sin(yaw)
-    cp = wp.cos(pitch)
-    sp = wp.sin(pitch)
-    cr = wp.cos(roll)
-    sr = wp.sin(roll)
-    turn = wp.mat33(cy, -sy, 0.0, sy, cy, 0.0, 0.0, 0.0, 1.0)
-    tilt = wp.mat33(cp, 0.0, sp, 0.0, 1.0, 0.0, -sp, 0.0, cp) * wp.mat33(1.0, 0.0, 0.0, 0.0, cr, -sr, 0.0, sr, cr)
-    cd = wp.cos(rules.pitch_down)
-    sd = wp.sin(rules.pitch_down)
-    rest = wp.mat33(cd, 0.0, sd, 0.0, 1.0, 0.0, -sd, 0.0, cd)
-    ahead = wp.vec3(rules.forward, 0.0, 0.0)
-    if rules.with_trunk != 0:
-        rotation[n] = turn * tilt * rest
-        ahead = turn * tilt * ahead
-    else:
-        # the camera turns about itself: roll about its own axis, pitch about its own side
-        rotation[n] = turn * rest * tilt
-        ahead = turn * ahead
-    p = robots.position[n]
-    position[n] = wp.vec3(p[0] + ahead[0], p[1] + ahead[1], wp.max(height + ahead[2], 0.05))
-    holes[n] = rules.dropout * wp.randf(state)
-
-
-@wp.kernel
-@no_type_check
-def render_interior(
-    homes: Homes,
-    rules: Rules,
-    seed: wp.array(dtype=wp.int32),
-    robots: Robots,
-    position: wp.array(dtype=wp.vec3),
-    rotation: wp.array(dtype=wp.mat33),
-    holes: wp.array(dtype=wp.float32),
-    depth: wp.array(dtype=wp.float16, ndim=3),
-):
-    """Depth along the optical axis as a share of the far limit, one thread a pixel. Floor and ceiling are planes: no
-    rays are lost on them, and none leaves a home through its floor."""
-    n, row, column = wp.tid()
-    direction = rotation[n] * look_through(row, column, depth.shape[1], depth.shape[2], rules.tan_half)
-    origin = position[n]
-    far = rules.far
-    if direction[2] < -1.0e-6:
-        far = wp.min(far, -origin[2] / direction[2])
-    ceiling = robots.mount[n][3]
-    if direction[2] > 1.0e-6 and ceiling > 0.0:
-        far = wp.min(far, wp.max(ceiling - origin[2], 0.0) / direction[2])
-    hit = wp.mesh_query_ray(homes.meshes[robots.home[n]], origin, direction, far)
-    if hit.result:
-        far = wp.min(hit.t, far)
-    if rules.noise > 0.0 or rules.dropout > 0.0:
-        pixel = (n * depth.shape[1] + row) * depth.shape[2] + column
-        state = wp.rand_init(seed[0] + 4 * seed[1] + 3, pixel)
-        if wp.randf(state) < holes[n]:
-            far = rules.far
-        far = wp.clamp(far * (1.0 + rules.noise * wp.randn(state)), 0.0, rules.far)
-    depth[n, row, column] = wp.float16(far / rules.far)

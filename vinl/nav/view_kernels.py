@@ -1,0 +1,96 @@
+"""The Warp kernels of what robots see: one thread a camera, or a pixel. A file of their own: Warp compiles these
+functions, Python never runs them."""
+
+# pyright: reportInvalidTypeForm=false, reportCallIssue=false, reportArgumentType=false
+# pyright: reportOperatorIssue=false, reportIndexIssue=false, reportAttributeAccessIssue=false
+
+from typing import no_type_check
+
+import warp as wp
+
+from vinl.nav.grids import Homes
+from vinl.nav.motion_kernels import Rules
+from vinl.nav.robots import Robots
+from vinl.sensing.kernels import look_through
+from vinl.sensing.warp_start import start_warp
+
+start_warp()
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel
+@no_type_check
+def aim_cameras(
+    rules: Rules,
+    seed: wp.array(dtype=wp.int32),
+    robots: Robots,
+    position: wp.array(dtype=wp.vec3),
+    rotation: wp.array(dtype=wp.mat33),
+    holes: wp.array(dtype=wp.float32),
+):
+    """Where each camera is and where it looks in this step; the share of its pixels that read as the far limit."""
+    n = wp.tid()
+    state = wp.rand_init(seed[0] + 4 * seed[1] + 2, n)
+    mount = robots.mount[n]
+    sway = robots.amplitude[n] * robots.sway[n]
+    roll = mount[0] + rules.tilt_shake[0] * sway[0] + rules.tilt_uniform * (2.0 * wp.randf(state) - 1.0)
+    pitch = mount[1] + rules.tilt_shake[1] * sway[1] + rules.tilt_uniform * (2.0 * wp.randf(state) - 1.0)
+    height = rules.mount_height + mount[2] + rules.height_shake * sway[2]
+    yaw = robots.yaw[n]
+    cy = wp.cos(yaw)
+    sy = wp.sin(yaw)
+    cp = wp.cos(pitch)
+    sp = wp.sin(pitch)
+    cr = wp.cos(roll)
+    sr = wp.sin(roll)
+    turn = wp.mat33(cy, -sy, 0.0, sy, cy, 0.0, 0.0, 0.0, 1.0)
+    tilt = wp.mat33(cp, 0.0, sp, 0.0, 1.0, 0.0, -sp, 0.0, cp) * wp.mat33(1.0, 0.0, 0.0, 0.0, cr, -sr, 0.0, sr, cr)
+    cd = wp.cos(rules.pitch_down)
+    sd = wp.sin(rules.pitch_down)
+    rest = wp.mat33(cd, 0.0, sd, 0.0, 1.0, 0.0, -sd, 0.0, cd)
+    ahead = wp.vec3(rules.forward, 0.0, 0.0)
+    if rules.with_trunk != 0:
+        rotation[n] = turn * tilt * rest
+        ahead = turn * tilt * ahead
+    else:
+        # the camera turns about itself: roll about its own axis, pitch about its own side
+        rotation[n] = turn * rest * tilt
+        ahead = turn * ahead
+    p = robots.position[n]
+    position[n] = wp.vec3(p[0] + ahead[0], p[1] + ahead[1], wp.max(height + ahead[2], 0.05))
+    holes[n] = rules.dropout * wp.randf(state)
+
+
+@wp.kernel
+@no_type_check
+def render_interior(
+    homes: Homes,
+    rules: Rules,
+    seed: wp.array(dtype=wp.int32),
+    robots: Robots,
+    position: wp.array(dtype=wp.vec3),
+    rotation: wp.array(dtype=wp.mat33),
+    holes: wp.array(dtype=wp.float32),
+    depth: wp.array(dtype=wp.float16, ndim=3),
+):
+    """Depth along the optical axis as a share of the far limit, one thread a pixel. Floor and ceiling are planes: no
+    rays are lost on them, and none leaves a home through its floor."""
+    n, row, column = wp.tid()
+    direction = rotation[n] * look_through(row, column, depth.shape[1], depth.shape[2], rules.tan_half)
+    origin = position[n]
+    far = rules.far
+    if direction[2] < -1.0e-6:
+        far = wp.min(far, -origin[2] / direction[2])
+    ceiling = robots.mount[n][3]
+    if direction[2] > 1.0e-6 and ceiling > 0.0:
+        far = wp.min(far, wp.max(ceiling - origin[2], 0.0) / direction[2])
+    hit = wp.mesh_query_ray(homes.meshes[robots.home[n]], origin, direction, far)
+    if hit.result:
+        far = wp.min(hit.t, far)
+    if rules.noise > 0.0 or rules.dropout > 0.0:
+        pixel = (n * depth.shape[1] + row) * depth.shape[2] + column
+        state = wp.rand_init(seed[0] + 4 * seed[1] + 3, pixel)
+        if wp.randf(state) < holes[n]:
+            far = rules.far
+        far = wp.clamp(far * (1.0 + rules.noise * wp.randn(state)), 0.0, rules.far)
+    depth[n, row, column] = wp.float16(far / rules.far)
