@@ -1,20 +1,18 @@
-"""Thousands of homes on one device: distance fields, clearance, starts, and meshes for the camera."""
+"""Thousands of homes on one device: which they are, where they come from, and how fresh ones take their places."""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
-import warp as wp
 
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
-from vinl.nav.grids import Homes
 from vinl.nav.home_builder import BuiltHome, prepare_home
+from vinl.nav.home_memory import HomeMemory
 from vinl.nav.home_stream import HomeStream, build_plans, count_workers
 from vinl.sensing.depth import check_device
 from vinl.world.floorplan import FloorPlan
@@ -25,9 +23,6 @@ _TRIES = 50
 
 _SPARE_ROOM = 1.3
 """A fresh home takes the place of one up to this much larger."""
-
-_KEPT = 64
-"""Meshes of homes gone that are kept a while: launches that read them may not have run yet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,40 +71,14 @@ class HomeStore:
     ) -> None:
         if not built:
             raise InputError("the navigation environment needs at least one home")
-        self.device = check_device(device)
-        self._warp_device, self._tree = str(self.device), tree
+        self._memory = HomeMemory(built, check_device(device), tree)
+        self.device, self.homes = self._memory.device, self._memory.homes
         self.records = [_record(home) for home in built]
         self.dropped, self.replaced, self.skipped = dropped, 0, 0
         self.reasons: list[str] = []
-        self._capacity = np.array([home.cells for home in built])
         self._age = np.arange(len(built))
-        self._mesh: list[wp.Mesh] = [self._build_mesh(home) for home in built]
-        self._gone: deque[wp.Mesh] = deque(maxlen=_KEPT)
         self._stream: HomeStream | None = None
         self._due, self._pace = 0.0, 0.0
-        goals, starts = len(built[0].goals), len(built[0].starts)
-        slots, cells = len(built), int(self._capacity.sum())
-        if cells * 4 >= 2**31:
-            raise InputError(f"{slots} homes have {cells} cells together; a store holds up to {2**29}: use fewer homes")
-        first = np.concatenate([[0], np.cumsum(self._capacity)[:-1]])
-        self._first = first
-        self._tensors = {
-            "first": torch.as_tensor(first.astype(np.int32), device=self.device),
-            "shape": torch.zeros(slots, 2, dtype=torch.int32, device=self.device),
-            "origin": torch.zeros(slots, 2, device=self.device),
-            "clearance": torch.zeros(4 * cells, dtype=torch.float16, device=self.device),
-            "fields": torch.full((cells, goals), float("inf"), dtype=torch.float16, device=self.device),
-            "goals": torch.zeros(slots, goals, 2, device=self.device),
-            "starts": torch.zeros(slots, starts, 2, device=self.device),
-            "generation": torch.zeros(slots, dtype=torch.int32, device=self.device),
-            "meshes": torch.as_tensor(np.array([mesh.id for mesh in self._mesh], np.int64), device=self.device),
-        }
-        vectors = {"shape": wp.vec2i, "origin": wp.vec2, "goals": wp.vec2, "starts": wp.vec2, "meshes": wp.uint64}
-        self.homes = Homes()
-        for name, tensor in self._tensors.items():
-            setattr(self.homes, name, wp.from_torch(tensor, dtype=vectors.get(name)))
-        for slot, home in enumerate(built):
-            self._write(slot, home)
 
     @classmethod
     def build(
@@ -241,9 +210,7 @@ class HomeStore:
     @property
     def memory_bytes(self) -> int:
         """Device memory of all homes but their meshes' ray trees."""
-        return sum(t.numel() * t.element_size() for t in self._tensors.values()) + sum(
-            mesh.points.capacity + mesh.indices.capacity for mesh in self._mesh
-        )
+        return self._memory.count_bytes()
 
     def refresh(self) -> int:
         """Put fresh homes, as far as they are due and ready, in the place of old ones; call it once a step.
@@ -276,24 +243,21 @@ class HomeStore:
         Returns:
             False if there is no such slot; the home is then counted in ``skipped``.
         """
-        fitting = (self._capacity >= home.cells) & (self._capacity <= _SPARE_ROOM * home.cells)
+        capacity = self._memory.capacity
+        fitting = (capacity >= home.cells) & (capacity <= _SPARE_ROOM * home.cells)
         if not fitting.any():
             self.skipped += 1
             return False
         slot = int(np.where(fitting, self._age, np.iinfo(np.int64).max).argmin())
         self._age[slot] = self._age.max() + 1
-        self._gone.append(self._mesh[slot])
-        self._mesh[slot] = self._build_mesh(home)
-        self._tensors["meshes"][slot] = self._mesh[slot].id
         self.records[slot] = _record(home)
-        self._write(slot, home)
-        self._tensors["generation"][slot] += 1
+        self._memory.replace(slot, home)
         self.replaced += 1
         return True
 
     def generations(self) -> torch.Tensor:
         """(homes,) int32 on the device: how many homes were in each slot before."""
-        return self._tensors["generation"]
+        return self._memory.generations()
 
     def save_state(self) -> dict[str, Any]:
         """Which homes are here, by their seeds."""
@@ -308,32 +272,6 @@ class HomeStore:
         if self._stream is not None:
             self._stream.close()
             self._stream = None
-
-    def _build_mesh(self, home: BuiltHome) -> wp.Mesh:
-        stream = None
-        if self.device.type == "cuda":  # in order with torch's work, which reads the mesh
-            stream = wp.stream_from_torch(torch.cuda.current_stream(self.device))
-        with wp.ScopedStream(stream):
-            points = wp.array(home.vertices, dtype=wp.vec3, device=self._warp_device)
-            faces = wp.array(home.faces.ravel(), dtype=wp.int32, device=self._warp_device)
-            return wp.Mesh(points=points, indices=faces, bvh_constructor=self._tree)
-
-    def _write(self, slot: int, home: BuiltHome) -> None:
-        tensors, begin, cells = self._tensors, int(self._first[slot]), home.cells
-        if home.goals.shape != tensors["goals"].shape[1:] or home.starts.shape != tensors["starts"].shape[1:]:
-            raise InputError("all homes of a store need as many goals and starts")
-        self._copy(tensors["fields"][begin : begin + cells], home.fields.reshape(cells, -1))
-        self._copy(tensors["clearance"][4 * begin : 4 * (begin + cells)], home.clearance.reshape(-1))
-        self._copy(tensors["goals"][slot], home.goals)
-        self._copy(tensors["starts"][slot], home.starts)
-        self._copy(tensors["shape"][slot], np.array(home.fields.shape[:2], np.int32))
-        self._copy(tensors["origin"][slot], np.array(home.origin, np.float32))
-
-    def _copy(self, target: torch.Tensor, values: np.ndarray) -> None:
-        source = torch.from_numpy(values)
-        if self.device.type == "cuda":
-            source = source.pin_memory()  # otherwise the host waits for what the device has still to do
-        target.copy_(source, non_blocking=True)
 
 
 def _record(home: BuiltHome) -> HomeRecord:
