@@ -12,8 +12,8 @@ from typing import Any
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config, load_config
 from vinl.nav.config import EpisodeConfig, NavConfig
-from vinl.nav.robot_config import CameraConfig
 from vinl.nav.home_store import HomeStore
+from vinl.nav.robot_config import CameraConfig
 from vinl.policies.card import PolicyCard, find_previous
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
