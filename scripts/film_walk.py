@@ -65,7 +65,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--plan", default="harbour_flat")
-    parser.add_argument("--loco", default="teacher")
+    parser.add_argument("--loco", default="loco")
     parser.add_argument("--nav", default="oracle")
     parser.add_argument("--obstacles", default="paper")
     parser.add_argument("--episode", type=int, default=7)
