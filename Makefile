@@ -12,7 +12,7 @@ OUT ?= runs/demo
 .DELETE_ON_ERROR:
 
 demo: install
-	$(BIN)/vinl eval --floorplans $(PLANS) --loco loco --nav oracle --episodes 2 --seeds 1 --obstacles paper \
+	$(BIN)/vinl eval --floorplans $(PLANS) --loco loco --nav nav --episodes 2 --seeds 1 --obstacles paper \
 	  --out $(OUT) --video --fresh
 
 PLANS ?= $(shell $(BIN)/python -c "import vinl; print(*vinl.shipped_floorplans()[:2])" 2>/dev/null)
