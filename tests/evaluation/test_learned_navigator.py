@@ -87,13 +87,13 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     save_policy("loco", loco.network, loco.card)
     save_policy("nav", nav.network, nav.card)
     options = "--floorplans harbour_flat --episodes 1 --seeds 1 --workers 1 --set time_limit=0.5 --out runs"
-    assert main(["eval", *f"--loco loco --nav nav {options}".split()]) == 0
+    assert main(["eval", *f"--loco ./loco --nav ./nav {options}".split()]) == 0
     policies = json.loads(Path("runs/results.json").read_text())["policies"]
     assert {name: row["name"] for name, row in policies.items()} == {"locomotion": "walker", "navigation": "guide"}
     capsys.readouterr()
     for given, words in (
-        ("--loco nav", "guide is a navigation policy; a locomotor"),
-        ("--nav loco", "walker is a locomotion policy; a navigator"),
+        ("--loco ./nav", "guide is a navigation policy; a locomotor"),
+        ("--nav ./loco", "walker is a locomotion policy; a navigator"),
         ("--nav rough", "rough is a locomotion policy; a navigator"),
         ("--nav orcale", "unknown navigator 'orcale', did you mean 'oracle'"),
     ):
