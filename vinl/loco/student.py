@@ -16,11 +16,11 @@ from vinl.loco.scenery import terrain_mesh
 from vinl.loco.sight import Sight
 from vinl.loco.sighted_env import SightedVecEnv
 from vinl.loco.student_config import StudentConfig
-from vinl.loco.warm_start import load_teacher
+from vinl.loco.warm_start import load_teacher, take_over_student
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.commit import find_commit
 from vinl.policies.depth_actor import DepthActor
-from vinl.policies.io import load_policy, save_policy
+from vinl.policies.io import save_policy
 from vinl.policies.networks import MapActor
 from vinl.rl.loop import TrainingLoop
 from vinl.rl.run_folder import RunFolder
@@ -66,21 +66,6 @@ def build_student(config: StudentConfig, teacher: MapActor) -> DepthActor:
     return student
 
 
-def take_over(student: DepthActor, name_or_path: str) -> None:
-    """Give a student the image network and memory of another; the teacher's actor behind them comes later.
-
-    Raises:
-        InputError: no such policy, or one with other networks.
-    """
-    other = load_policy(name_or_path).network
-    if other.describe() != student.describe():
-        raise InputError(
-            f"student.start={name_or_path}: its network {other.describe()} is not that of this training "
-            f"{student.describe()}; set student.network and student.camera to its own"
-        )
-    student.load_state_dict(other.state_dict())
-
-
 def train_student(
     config: LocoConfig,
     run: RunFolder,
@@ -117,7 +102,7 @@ def train_student(
     stopwatch = Stopwatch(device)
     student = build_student(settings, teacher)
     if settings.start and not resume:
-        take_over(student, settings.start)
+        take_over_student(settings.start, student, config)
     environment = LocoEnvironment(config)
     camera = settings.camera.record()
     mesh = terrain_mesh(environment.terrain)

@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from vinl.config.errors import InputError
 from vinl.loco.config import LocoConfig
 from vinl.policies.card import PolicyCard
+from vinl.policies.depth_actor import DepthActor
 from vinl.policies.io import find_policy, load_policy
 from vinl.policies.networks import BlindActor, MapActor
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
@@ -100,6 +101,28 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origi
     return policy.network, find_origin(policy.card, policy.network, critic=False)
 
 
+def take_over_student(name_or_path: str, student: DepthActor, config: LocoConfig) -> None:
+    """Give a student the image network and memory of another one; the teacher's actor comes behind them later.
+
+    Args:
+        name_or_path: as for ``load_warm_start``.
+        student: its weights are overwritten.
+        config: of its training.
+
+    Raises:
+        InputError: no such policy, one with other networks or with other joint gains.
+    """
+    policy = load_policy(name_or_path)
+    given, wanted = policy.network.describe(), student.describe()
+    if given != wanted:
+        raise InputError(
+            f"student.start={name_or_path}: its network {_list(given)} is not that of this training {_list(wanted)}; "
+            "set student.network and student.camera to its own"
+        )
+    check_gains(name_or_path, policy.card, config)
+    student.load_state_dict(policy.network.state_dict())
+
+
 _KINDS = {
     "BlindActor": "a locomotor without a map (BlindActor)",
     "DepthActor": "a student itself (DepthActor)",
@@ -115,9 +138,7 @@ def check_gains(name_or_path: str, card: PolicyCard, config: LocoConfig) -> None
     """
     gains = float(card.action["kp"]), float(card.action["kd"])
     if gains != (config.kp, config.kd):
-        raise InputError(
-            f"--from {name_or_path}: it was trained with kp {gains[0]:g} and kd {gains[1]:g}; set kp and kd"
-        )
+        raise InputError(f"{name_or_path}: it was trained with kp {gains[0]:g} and kd {gains[1]:g}; set kp and kd")
 
 
 def find_origin(card: PolicyCard, network: nn.Module, critic: bool) -> Origin:

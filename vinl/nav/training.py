@@ -201,13 +201,14 @@ def build_algorithm(
     actor = build_actor(config)
     if weights is not None:
         actor.load_state_dict(weights)
+    hidden = _WAY_SIZE if p.way else 0
     model = RecurrentActorCritic(
         actor,
         p.log_std,
         p.log_std_range,
         privileged=int(config.network.privileged),
         values=config.network.values,
-        guesses=_WAY_SIZE if p.way else 0,
+        guesses=hidden,
     ).to(device)
     storage = RecurrentStorage(
         p.steps,
@@ -219,7 +220,7 @@ def build_algorithm(
         ACTION_SIZE,
         actor.initial_state(config.num_envs, device),
         device,
-        hidden=_WAY_SIZE if p.way else 0,
+        hidden=hidden,
     )
     low, high = p.rate_limits(0.0)
     rate = DeviceRate(
