@@ -206,7 +206,7 @@ class PpoConfig:
     critic: tuple[int, ...] = (512, 256, 128)
     encoder: tuple[int, ...] = (128, 64)
     code: int = 32
-    update: Literal["rsl_rl", "fast", "graphs"] = "rsl_rl"
+    update: Literal["rsl_rl", "fast", "graphs"] = "graphs"
 
     def __post_init__(self) -> None:
         if min(self.steps, self.epochs, self.minibatches) < 1:
