@@ -143,3 +143,22 @@ def test_stage_that_does_not_exist_is_refused(small_config):
 
     with pytest.raises(InputError, match="stage 7"):
         dataclasses.replace(small_config, stage=7)
+
+
+def test_drift_is_the_error_smoothed_over_half_a_second(fresh):
+    told = jnp.tile(jnp.array([0.5, 0.0, 0.4]), (8, 1))
+    fresh.state = fresh.state._replace(
+        command=told, command_left=jnp.full(8, 1000, jnp.int32), drift=jnp.zeros((8, 3)), step=jnp.zeros(8, jnp.int32)
+    )
+    fresh.set_rewards(dataclasses.replace(fresh.config.rewards, drift=-1.0, turn_drift=-2.0, floor=-100.0))
+    try:
+        for _ in range(25):
+            fresh.step(jnp.zeros((8, 12)))  # they stand
+    finally:
+        fresh.set_rewards(fresh.config.rewards)
+    reached = 1 - (1 - 0.02 / 0.5) ** 25
+    drift = np.asarray(fresh.state.drift)
+    np.testing.assert_allclose(np.median(drift, 0), [-0.5 * reached, 0.0, -0.4 * reached], atol=0.12)
+    measures = fresh.read_measures()
+    assert measures["reward/turn_drift"] == pytest.approx(2 * 0.4 / 0.5 * measures["reward/drift"], rel=0.35)
+    assert measures["reward/drift"] < -1e-3

@@ -93,3 +93,34 @@ def test_execution_lags_and_slips(blind, homes):
     noisy = run(1, speed_noise=0.1, speed_gain=(0.8, 0.9))
     assert noisy[0].mean() / 0.5 == pytest.approx(0.85, abs=0.03)
     assert noisy[0].std() / 0.5 == pytest.approx(math.hypot(0.1, 0.1 / math.sqrt(12)), rel=0.3)
+
+
+def test_gives_way_when_it_turns_against_something(blind, homes):
+    def run(give_way):
+        rng = np.random.default_rng(1)
+        environment = NavEnvironment(replace(blind, execution=ExecutionConfig(give_way=give_way)), homes)
+        home, xy, yaw = scatter(homes, rng)
+        environment.place(torch.tensor(home), torch.zeros(N, dtype=torch.int64), torch.tensor(xy), torch.tensor(yaw))
+        before = environment.state["position"].clone(), environment.state["yaw"].clone()
+        action = torch.tensor(rng.uniform(-1, 1, (N, 2)).astype(np.float32))
+        environment.advance(action)
+        assert environment.ended is not None
+        turn = torch.remainder(environment.state["yaw"] - before[1] + math.pi, 2 * math.pi) - math.pi
+        way = torch.linalg.vector_norm(environment.state["position"] - before[0], dim=1)
+        return environment.ended.collisions > 0, way, turn, 0.5 * math.pi / 3 * action[:, 1], environment, home
+
+    blocked, way, turn, _, _, _ = run(0.0)
+    assert blocked.any() and way[blocked].max() < 1e-6 and turn[blocked].abs().max() < 1e-6
+    touched, pushed, turned, told, environment, home = run(0.1)
+    assert torch.equal(touched, blocked)
+    torch.testing.assert_close(way[~blocked], pushed[~blocked])
+    assert pushed[blocked].max() < 0.1 + 1e-5
+    free = turned.abs() > 1e-6
+    assert (free & blocked).sum() > 0.6 * blocked.sum()
+    torch.testing.assert_close(turned[free & blocked], told[free & blocked], atol=1e-4, rtol=0)
+    low = [Boxes(r.solid[r.solid[:, 5] < BODY_HEIGHT].astype(float)) for r in homes.records]
+    walls = [shapely.union_all([shapely.Polygon(c) for c in boxes.corners()]) for boxes in low]
+    state = environment.state
+    for k in torch.nonzero(free & blocked)[:, 0].tolist():
+        inner = rectangles([(state["position"][k].numpy(), state["yaw"][k].item())], 0.55, 0.21)[0]
+        assert not walls[home[k]].intersects(inner)

@@ -30,8 +30,10 @@ class Options:
     seed: int = 0
     """Of starts, goals, headings and the camera's motion."""
     motion: str = "walking"
-    """How camera and robot move: walking (as recorded from the walking robot on clutter), level (recorded on level
-    ground), steady (not at all), or paper (roll and pitch redrawn within 30 deg at each step, perfect execution)."""
+    """How camera and robot move: walking (as recorded from the walking robot on clutter), cancelled (the same, but a
+    step that touches something is cancelled as a whole, as in the paper; walking robots can still turn), level
+    (recorded on level ground), steady (not at all), or paper (roll and pitch redrawn within 30 deg at each step,
+    perfect execution)."""
     clutter: float = 0.0
     """Share of the homes with blocks that the camera sees and the robot steps over."""
     min_distance: float = 5.0

@@ -68,6 +68,9 @@ class RewardConfig:
         stand_still: joint angles away from the default pose while told to stand.
         fall: one fall (not multiplied by the control step).
         velocity_error: squared error of the commanded velocity in the plane.
+        drift: error of the velocity in the plane, smoothed over half a second [m/s]; for each metre off the way, then,
+            however slowly it was left.
+        turn_drift: the same of the turning rate [rad/s].
         sigma: width of the tracking terms [(m/s)^2].
         floor: the sum of a step's terms is held to at least this for each second [legged_gym: 0].
     """
@@ -86,6 +89,8 @@ class RewardConfig:
     orientation: float = 0.0
     stand_still: float = 0.0
     velocity_error: float = 0.0
+    drift: float = 0.0
+    turn_drift: float = 0.0
     fall: float = 0.0
     sigma: float = 0.25
     floor: float = 0.0

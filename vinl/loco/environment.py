@@ -30,6 +30,9 @@ _EDGE = 2.0
 MAX_SPEED = 150.0
 """A speed beyond this [m/s, rad/s] means that the physics blew up."""
 
+_SMOOTHING = 0.5
+"""Time constant of ``State.drift`` [s]: about a stride, so that the sway of the gait is no drift."""
+
 _UPSIDE = -0.3
 """Third component of the gravity vector in the trunk above which the robot has fallen: tilted by more than 72 deg."""
 
@@ -221,6 +224,7 @@ class LocoEnvironment:
             life=jnp.where(done, 0, life),
             air_time=ended(jnp.zeros((n, 4)), motion.air_time * ~touching),
             touched=ended(jnp.zeros((n, 4), bool), contacts.foot),
+            drift=ended(jnp.zeros((n, 3)), motion.drift),
             way=jnp.where(done, 0.0, way),
             commanded=jnp.where(done, 0.0, commanded),
             hits=jnp.where(done, 0.0, hits),
@@ -246,9 +250,11 @@ class LocoEnvironment:
         down = jnp.broadcast_to(jnp.array([0.0, 0.0, -1.0]), (self.num_envs, 3))
         gravity = rotate_inverse(jnp, quaternion, down)
         touching = contacts.foot | old.touched
+        linear, angular = rotate_inverse(jnp, quaternion, body.qvel[:, :3]), body.qvel[:, 3:6]
+        error = jnp.concatenate([linear[:, :2], angular[:, 2:]], 1) - old.command
         motion = Motion(
-            linear=rotate_inverse(jnp, quaternion, body.qvel[:, :3]),
-            angular=body.qvel[:, 3:6],
+            linear=linear,
+            angular=angular,
             gravity=gravity,
             joints=body.qpos[:, 7:],
             joint_speed=body.qvel[:, 6:],
@@ -260,6 +266,7 @@ class LocoEnvironment:
             contacts=contacts,
             air_time=old.air_time + CONTROL_DT,
             landed=(old.air_time > 0) & touching,
+            drift=old.drift + (error - old.drift) * (CONTROL_DT / _SMOOTHING),
             fallen=contacts.trunk_down | (gravity[:, 2] > _UPSIDE) | broken,
         )
         return motion, touching

@@ -25,6 +25,7 @@ class Motion(NamedTuple):
         contacts: latched over the control step.
         air_time: (n, 4) seconds since each foot left the ground, this step included.
         landed: (n, 4) feet that touch down in this step.
+        drift: (n, 3) the errors of forward and sideways speed [m/s] and yaw rate [rad/s], smoothed over half a second.
         fallen: (n,).
     """
 
@@ -41,6 +42,7 @@ class Motion(NamedTuple):
     contacts: Contacts
     air_time: Float[Array, "n 4"]
     landed: Bool[Array, "n 4"]
+    drift: Float[Array, "n 3"]
     fallen: Bool[Array, " n"]
 
 
@@ -73,5 +75,7 @@ def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"
         "orientation": jnp.sum(m.gravity[:, :2] ** 2, 1),
         "stand_still": jnp.sum(jnp.abs(m.joints - jnp.asarray(DEFAULT_POSE, jnp.float32)), 1) * told_to_stand,
         "velocity_error": error2,
+        "drift": jnp.linalg.norm(m.drift[:, :2], axis=1),
+        "turn_drift": jnp.abs(m.drift[:, 2]),
         "fall": m.fallen / CONTROL_DT,
     }

@@ -56,12 +56,15 @@ class CameraConfig:
     """The student's camera: ``LOCOMOTION_CAMERA`` with another image.
 
     Attributes:
+        forward: of the optical centre, ahead of the trunk's middle [m]. The trunk ends at 0.339 m: a camera ahead of that
+            looks through a wall that the trunk touches.
         width, height: of the image [pixels].
         hfov: horizontal field of view [rad]; pixels are square.
         pitch_down: of the optical axis [rad].
         far: what is farther reads as this [m].
     """
 
+    forward: float = LOCOMOTION_CAMERA.position[0]
     width: int = LOCOMOTION_CAMERA.width
     height: int = LOCOMOTION_CAMERA.height
     hfov: float = LOCOMOTION_CAMERA.hfov
@@ -75,8 +78,9 @@ class CameraConfig:
 
     def record(self) -> Camera:
         """The camera record, as it goes onto the policy card."""
-        size = {"width": self.width, "height": self.height}
-        return replace(LOCOMOTION_CAMERA, hfov=self.hfov, pitch_down=self.pitch_down, far=self.far, **size)
+        position = (self.forward, *LOCOMOTION_CAMERA.position[1:])
+        view = {"hfov": self.hfov, "pitch_down": self.pitch_down, "far": self.far}
+        return replace(LOCOMOTION_CAMERA, position=position, width=self.width, height=self.height, **view)
 
 
 @dataclass(frozen=True)

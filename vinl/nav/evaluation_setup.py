@@ -21,12 +21,14 @@ from vinl.world.readers import expand_paths, shipped_floorplans
 
 MOTIONS = {
     "walking": "nav/motion/walking",
+    "cancelled": "nav/motion/cancelled",
     "level": "nav/motion/level",
     "steady": "nav/motion/steady",
     "paper": "nav/paper",
 }
-"""How camera and robot move, and the config that says it: as recorded from the walking robot on clutter or on level
-ground, not at all, or redrawn at each step [paper]."""
+"""How camera and robot move, and the config that says it: as recorded from the walking robot on clutter, the same with
+every step that touches cancelled as a whole, as recorded on level ground, not at all, or redrawn at each step [paper].
+"""
 
 ORACLE = "oracle"
 

@@ -39,6 +39,7 @@ class Rules:
     side_slip: wp.float32
     yaw_drift: wp.float32
     execution_amplitude: wp.vec2
+    give_way: wp.float32
     sees_motion: wp.int32
     tilt: wp.vec2
     tilt_offset: wp.vec2
@@ -68,6 +69,47 @@ def mix(between: wp.vec2, share: wp.float32) -> wp.float32:
     return between[0] + (between[1] - between[0]) * share
 
 
+@wp.func
+@no_type_check
+def place_after(
+    start: wp.vec2, yaw: wp.float32, v: wp.float32, slip: wp.float32, w: wp.float32, push: wp.vec2, t: wp.float32
+) -> wp.vec2:
+    """Where a robot is after t seconds at constant speed and slip [m/s, along its heading] and push [m/s, world]."""
+    half_turn = 0.5 * w * t
+    chord = t
+    if wp.abs(half_turn) > 1.0e-4:
+        chord = t * wp.sin(half_turn) / half_turn
+    c = wp.cos(yaw + half_turn)
+    s = wp.sin(yaw + half_turn)
+    return start + chord * wp.vec2(v * c - slip * s, v * s + slip * c) + t * push
+
+
+@wp.func
+@no_type_check
+def sweep_touches(
+    homes: Homes,
+    home: wp.int32,
+    rules: Rules,
+    start: wp.vec2,
+    yaw: wp.float32,
+    v: wp.float32,
+    slip: wp.float32,
+    w: wp.float32,
+    push: wp.vec2,
+) -> wp.bool:
+    """Whether the rectangle touches on its way; sub-poses at most 5 cm and 6 degrees apart."""
+    swept = wp.max((wp.sqrt(v * v + slip * slip) + wp.length(push)) / 0.05, wp.abs(w) / 0.1) * rules.period
+    steps = wp.max(wp.int32(wp.ceil(swept)), 1)
+    hit = bool(False)
+    k = int(1)
+    while k <= steps and not hit:
+        t = rules.period * wp.float32(k) / wp.float32(steps)
+        p = place_after(start, yaw, v, slip, w, push, t)
+        hit = touches(homes, home, p, yaw + w * t, rules.length, rules.width)
+        k = k + 1
+    return hit
+
+
 @wp.kernel
 @no_type_check
 def move_robots(
@@ -80,9 +122,10 @@ def move_robots(
     blocked: wp.array(dtype=wp.float32),
     straight: wp.array(dtype=wp.float32),
 ):
-    """One step: constant speed, slip and yaw rate over the period; cancelled as a whole if the swept rectangle touches.
+    """One step: constant speed, slip and yaw rate over the period. If the swept rectangle touches, it is cancelled as a
+    whole, or all but its turn (``Rules.give_way``).
 
-    Writes pose, velocity and distance of the robots, the way moved [m], 1 where cancelled, and the straight distance
+    Writes pose, velocity and distance of the robots, the way moved [m], 1 where it touched, and the straight distance
     to the goal [m]. Where the goal cannot be reached from the new place, the distance stays as it was.
     """
     n = wp.tid()
@@ -112,36 +155,36 @@ def move_robots(
 
     start = robots.position[n]
     yaw = robots.yaw[n]
-    # sub-poses at most 5 cm and 6 degrees apart
-    swept = wp.max(wp.sqrt(v * v + slip * slip) / 0.05, wp.abs(w) / 0.1) * rules.period
-    steps = wp.max(wp.int32(wp.ceil(swept)), 1)
-    hit = bool(False)
-    p = start
-    heading = yaw
-    k = int(1)
-    while k <= steps and not hit:
-        t = rules.period * wp.float32(k) / wp.float32(steps)
-        half_turn = 0.5 * w * t
-        chord = t
-        if wp.abs(half_turn) > 1.0e-4:
-            chord = t * wp.sin(half_turn) / half_turn
-        c = wp.cos(yaw + half_turn)
-        s = wp.sin(yaw + half_turn)
-        p = start + chord * wp.vec2(v * c - slip * s, v * s + slip * c)
-        heading = yaw + w * t
-        hit = touches(homes, home, p, heading, rules.length, rules.width)
-        k = k + 1
+    hit = sweep_touches(homes, home, rules, start, yaw, v, slip, w, wp.vec2(0.0, 0.0))
     moved[n] = wp.sqrt(v * v + slip * slip) * rules.period
     blocked[n] = 0.0
+    p = place_after(start, yaw, v, slip, w, wp.vec2(0.0, 0.0), rules.period)
     if hit:
+        # it stays; or turns where it stands, and what its corners meet pushes it back or aside
         p = start
-        heading = yaw
-        v = float(0.0)
-        w = float(0.0)
-        v_end = float(0.0)
-        w_end = float(0.0)
+        turned = bool(False)
         moved[n] = 0.0
+        if rules.give_way > 0.0:
+            ahead = wp.vec2(wp.cos(yaw), wp.sin(yaw))
+            aside = wp.vec2(-ahead[1], ahead[0])
+            k = int(0)
+            while k < 7 and not turned:
+                pushed = 0.5 * rules.give_way * wp.float32((k + 2) // 3)
+                side = (k + 2) % 3
+                to = wp.where(side == 0, -ahead, wp.where(side == 1, aside, -aside))
+                push = to * (pushed / rules.period)
+                if not sweep_touches(homes, home, rules, start, yaw, 0.0, 0.0, w, push):
+                    turned = True
+                    p = start + pushed * to
+                    moved[n] = pushed
+                k = k + 1
+        if not turned:
+            w = float(0.0)
+            w_end = float(0.0)
+        v = float(0.0)
+        v_end = float(0.0)
         blocked[n] = 1.0
+    heading = yaw + w * rules.period
     robots.previous[n] = wp.vec2(a0, a1)
     if rules.sees_motion != 0:
         robots.previous[n] = wp.vec2(

@@ -148,6 +148,8 @@ class ExecutionConfig:
         side_slip: standard deviation of a step's mean sideways speed [m/s], in proportion to the forward speed.
         yaw_drift: yaw rate of an episode when walking at full speed, uniform within +- this [rad/s].
         amplitude: range of a factor of an episode on the noises and the slip, uniform; 0 is sure of foot.
+        give_way: a step that would touch something is not cancelled as a whole: the robot turns on the spot as told,
+            and what its corners meet pushes it so far back or aside at most [m]; 0: cancelled as a whole [paper].
     """
 
     lag: float = 0.0
@@ -158,6 +160,7 @@ class ExecutionConfig:
     side_slip: float = 0.0
     yaw_drift: float = 0.0
     amplitude: Range = (1.0, 1.0)
+    give_way: float = 0.0
 
     def __post_init__(self) -> None:
         check_number("execution.lag", self.lag, 0.0, 5.0)
@@ -166,3 +169,4 @@ class ExecutionConfig:
         for name in ("speed_noise", "yaw_noise", "side_slip", "yaw_drift"):
             check_number(f"execution.{name}", getattr(self, name), 0.0, 1.0)
         check_range("execution.amplitude", self.amplitude, 0.0, 10.0)
+        check_number("execution.give_way", self.give_way, 0.0, 0.5)
