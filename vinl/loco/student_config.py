@@ -56,8 +56,8 @@ class CameraConfig:
     """The student's camera: ``LOCOMOTION_CAMERA`` with another image.
 
     Attributes:
-        forward: of the optical centre, ahead of the trunk's middle [m]. The trunk ends at 0.339 m: a camera ahead of that
-            looks through a wall that the trunk touches.
+        forward: of the optical centre, ahead of the trunk's middle [m]. The trunk ends at 0.339 m: a camera ahead of
+            that looks through a wall that the trunk touches.
         width, height: of the image [pixels].
         hfov: horizontal field of view [rad]; pixels are square.
         pitch_down: of the optical axis [rad].
