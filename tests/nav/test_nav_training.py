@@ -116,6 +116,16 @@ def test_who_starts_from_a_run_gets_its_critic(tmp_path):
         load_critic(second, tmp_path)
 
 
+def test_time_ends_a_training_and_cools_it(tmp_path, small, capsys):
+    run = tmp_path / "run"
+    more = ["ppo.last_log_std=-1.9", "ppo.cool_from=0", "ppo.last_rate=1e-5"]
+    assert train(small, run, "--iterations", "100000", "--minutes", "0.05", *more) == 0
+    assert "trained" in capsys.readouterr().out
+    curve = rows(run)
+    assert 1 <= len(curve) < 1000
+    assert len(curve) < 3 or curve[-1]["action_std"] < curve[0]["action_std"] - 0.05
+
+
 @pytest.mark.slow
 def test_two_processes_train_one_policy(tmp_path, small):
     assert train(small, tmp_path / "run", "--iterations", "2", "--devices", "2") == 0
@@ -130,6 +140,7 @@ def test_two_processes_train_one_policy(tmp_path, small):
     again = ["train-nav", "--device", "cpu", "--resume", str(run), "--iterations", "3", "--devices", "2"]
     assert main(again) == 0
     assert rows(run)[-1]["samples"] == 3 * 2 * 8 * 4
+    assert main([*again[:5], "--iterations", "100000", "--minutes", "0.03", "--devices", "2"]) == 0
 
 
 @pytest.mark.parametrize(
@@ -139,6 +150,7 @@ def test_two_processes_train_one_policy(tmp_path, small):
         (["--num-envs", "6", "ppo.minibatches=4"], "ppo.minibatches"),
         (["--iterations", "0"], "--iterations"),
         (["--devices", "0"], "--devices"),
+        (["--minutes", "0"], "--minutes"),
         (["ppo.epoch=3"], "ppo.epoch"),
         (["ppo.schedule=fast"], "ppo.schedule"),
         (["ppo.min_rate=1"], "min_rate"),

@@ -41,6 +41,8 @@ class Options:
     """Robots in parallel (default: the config's, 4096)."""
     iterations: int | None = None
     """Updates in all (default: the config's)."""
+    minutes: float | None = None
+    """The training is over after so many minutes too, and what moves during it keeps to them (default: no limit)."""
     seed: int | None = None
     """Of everything random (default: the config's)."""
     save_every: float = 60.0
@@ -60,7 +62,7 @@ def main(argv: list[str]) -> int:
     if options.resume and options.from_policy:
         raise InputError("--from starts a new run and --resume goes on with an old one; give one of them")
     if options.resume and (options.overrides or options.config or options.out or options.num_envs or options.seed):
-        raise InputError("--resume goes on with the run's own config; only --iterations and --device may be given")
+        raise InputError("--resume goes on with the run's own config; only --iterations, --minutes and --device may be given")
     from vinl.policies.device import choose_device
 
     device = options.device
@@ -88,10 +90,13 @@ def main(argv: list[str]) -> int:
         if options.stage not in (1, config.stage):
             raise InputError(f"--stage {options.stage}: {source} is a config of stage {config.stage}")
         folder = options.out or f"runs/{source.removesuffix('.yaml').split('/')[-1]}"
+    if options.minutes is not None and options.minutes <= 0:
+        raise InputError(f"--minutes must be positive, got {options.minutes}")
     if options.iterations is not None and options.iterations < 1:
         raise InputError(f"--iterations must be at least 1, got {options.iterations}")
     try:
-        complete = train_locomotor(config, folder, device, save_every=options.save_every, iterations=options.iterations)
+        limits = {"iterations": options.iterations, "minutes": options.minutes}
+        complete = train_locomotor(config, folder, device, save_every=options.save_every, **limits)
     except NotFiniteError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -46,6 +46,8 @@ class Options:
     """Robots in parallel on each device (default: the config's)."""
     iterations: int | None = None
     """Updates in all (default: the config's)."""
+    minutes: float | None = None
+    """The training is over after so many minutes too, and what moves during it keeps to them (default: no limit)."""
     seed: int | None = None
     """Of everything random but the homes (default: the config's)."""
     save_every: float = 60.0
@@ -63,11 +65,13 @@ def main(argv: list[str]) -> int:
         raise InputError(f"--devices must be at least 1, got {options.devices}")
     if options.iterations is not None and options.iterations < 1:
         raise InputError(f"--iterations must be at least 1, got {options.iterations}")
+    if options.minutes is not None and options.minutes <= 0:
+        raise InputError(f"--minutes must be positive, got {options.minutes}")
     if options.resume and options.from_policy:
         raise InputError("--from starts a new run and --resume goes on with an old one; give one of them")
     fresh = options.overrides or options.config != "default" or options.out or options.num_envs or options.seed
     if options.resume and fresh:
-        raise InputError("--resume goes on with the run's own config; only --iterations and --device may be given")
+        raise InputError("--resume goes on with the run's own config; only --iterations, --minutes and --device may be given")
     device = _choose_device(options)
 
     from vinl.config.loader import load_config
@@ -90,6 +94,7 @@ def main(argv: list[str]) -> int:
         device,
         save_every=options.save_every,
         iterations=options.iterations,
+        minutes=options.minutes,
         from_policy=options.from_policy,
         profile=options.profile,
     )

@@ -74,6 +74,7 @@ def train_student(
     name: str = "",
     save_every: float = 60.0,
     iterations: int | None = None,
+    minutes: float | None = None,
 ) -> bool:
     """Train a student, or go on with a run; arguments as for ``train_locomotor``.
 
@@ -138,7 +139,7 @@ def train_student(
     )
     if resume:
         loop.resume()
-    return loop.train(iterations or config.iterations)
+    return loop.train(iterations or config.iterations, minutes)
 
 
 def _teacher_card(name: str, config: LocoConfig, network: dict[str, Any], samples: int, commit: str) -> PolicyCard:

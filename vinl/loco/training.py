@@ -89,6 +89,7 @@ def train_locomotor(
     name: str = "",
     save_every: float = 60.0,
     iterations: int | None = None,
+    minutes: float | None = None,
 ) -> bool:
     """Train a locomotor, or go on with a run.
 
@@ -99,6 +100,7 @@ def train_locomotor(
         name: of the policy; defaults to the folder's.
         save_every: seconds between checkpoints.
         iterations: updates in all; defaults to the configuration's.
+        minutes: after which the training is over too; settings that move over the training keep to them.
 
     Returns:
         Whether the run is complete (an interrupt stops it earlier; both leave a checkpoint and a policy).
@@ -114,7 +116,7 @@ def train_locomotor(
     if config.stage == 3:
         from vinl.loco.student import train_student  # Warp is started for stage 3 alone
 
-        return train_student(config, run, resume, device, name, save_every, iterations)
+        return train_student(config, run, resume, device, name, save_every, iterations, minutes)
     begun = resume and (run.path / CHECKPOINT).exists()
     start = load_warm_start(config.from_policy, config) if config.from_policy and not begun else None
     if not resume:
@@ -144,7 +146,7 @@ def train_locomotor(
         runner.start_from(training_names(start.actor), start.critic)
     if resume:
         runner.resume()
-    return runner.train(iterations or config.iterations)
+    return runner.train(iterations or config.iterations, minutes)
 
 
 def teach_critic_first(algorithm: Any, iteration: int, ppo: PpoConfig) -> None:

@@ -47,6 +47,7 @@ def train_navigator(
     name: str = "",
     save_every: float = 60.0,
     iterations: int | None = None,
+    minutes: float | None = None,
     from_policy: str | None = None,
     profile: bool = False,
 ) -> bool:
@@ -59,6 +60,7 @@ def train_navigator(
         name: of the policy; defaults to the folder's.
         save_every: seconds between checkpoints.
         iterations: updates in all; defaults to the configuration's.
+        minutes: after which the training is over too; settings that move over the training keep to them.
         from_policy: start from the weights of this policy or run, of a run from its critic and spread of the actions
             too; default: fresh ones.
         profile: write where the time of one iteration goes to ``profile.txt`` in the folder.
@@ -129,7 +131,7 @@ def train_navigator(
     if resume:
         loop.resume()
     try:
-        return loop.train(iterations or config.iterations)
+        return loop.train(iterations or config.iterations, minutes)
     finally:
         environment.homes.close()
         peers.close()

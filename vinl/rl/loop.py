@@ -102,7 +102,7 @@ class TrainingLoop:
         device: torch device.
         export: called after every checkpoint with the policy and the samples so far; writes the policy.
         figures: picks what the progress bar shows from an iteration's measures.
-        schedule: called before every iteration with the algorithm and the share of iterations done, to move settings.
+        schedule: called before every iteration with the algorithm and the share of the training done, to move settings.
         save_every: seconds between checkpoints.
         stopwatch: whose parts go into the curves where it ran.
 
@@ -169,11 +169,15 @@ class TrainingLoop:
         )
         self.export(self.alg.get_policy(), self.samples)
 
-    def train(self, iterations: int) -> bool:
-        """Go on until ``iterations`` are done in all, or an interrupt asks to stop; both save.
+    def train(self, iterations: int, minutes: float | None = None) -> bool:
+        """Go on until ``iterations`` are done in all, time is up or an interrupt asks to stop; all of them save.
+
+        Args:
+            iterations: updates in all.
+            minutes: from now on, after which the training is over too; settings then move with whichever is further.
 
         Returns:
-            Whether all iterations are done.
+            Whether the training is over.
 
         Raises:
             NotFiniteError: more than one robot step in a thousand of an iteration was not finite. The checkpoint is
@@ -184,11 +188,12 @@ class TrainingLoop:
         writer = SummaryWriter(str(self.folder.path / "tensorboard"), purge_step=first)
         observation = self.env.get_observations().to(self.device)
         self.alg.train_mode()
-        saved = time.monotonic()
-        with TrainingProgress(iterations, first) as progress, self._interruptible(progress):
-            while self.current_learning_iteration < iterations and not self._stop and wrong is None:
+        saved = begun = time.monotonic()
+        bar = TrainingProgress(iterations, first) if minutes is None else TrainingProgress(round(60 * minutes))
+        with bar as progress, self._interruptible(progress):
+            while (share := self._share_done(iterations, begun, minutes)) < 1 and not self._stop and wrong is None:
                 start = time.perf_counter()
-                self.schedule(self.alg, self.current_learning_iteration / iterations)
+                self.schedule(self.alg, share)
                 observation = self._roll_out(observation)
                 collected = time.perf_counter()
                 losses = self._learn()
@@ -214,8 +219,11 @@ class TrainingLoop:
                 )
                 for name, value in row.items():
                     writer.add_scalar(name if "/" in name else f"train/{name}", value, self.current_learning_iteration)
-                progress.show(self.current_learning_iteration, self.figures(row))
                 count = self.current_learning_iteration
+                if minutes is None:
+                    progress.show(count, self.figures(row))
+                else:
+                    progress.show(round(time.monotonic() - begun), {"iteration": f"{count}", **self.figures(row)})
                 wrong = judge_losses(self.env, measures, steps * self.env.num_envs, count, self.folder)
                 if wrong is None and sound and time.monotonic() - saved > self.save_every:
                     self.checkpoint()
@@ -226,7 +234,12 @@ class TrainingLoop:
         writer.close()
         if wrong is not None:
             raise NotFiniteError(wrong if kept else f"{wrong}; the policy is not finite either: the checkpoint is old")
-        return self.current_learning_iteration >= iterations
+        return share >= 1
+
+    def _share_done(self, iterations: int, begun: float, minutes: float | None) -> float:
+        """Of iterations or of the time since ``begun``, whichever is more."""
+        share = self.current_learning_iteration / iterations
+        return share if minutes is None else max(share, (time.monotonic() - begun) / (60 * minutes))
 
     def _roll_out(self, observation: Any) -> Any:
         with torch.inference_mode():

@@ -59,6 +59,14 @@ class Peers:
         dist.all_reduce(value)
         return bool(value > 0)
 
+    def first(self, number: float, device: torch.device | str = "cpu") -> float:
+        """The number that the first process gave."""
+        if self.count == 1:
+            return number
+        value = torch.tensor(number, dtype=torch.float64, device=device)
+        dist.broadcast(value, 0)
+        return float(value)
+
     def close(self) -> None:
         """The end of the training."""
         if self.count > 1 and dist.is_initialized():

@@ -45,12 +45,17 @@ class PeerLoop(TrainingLoop):
         self.peers.share(self.alg.get_policy())
         return found
 
-    def train(self, iterations: int) -> bool:
+    def train(self, iterations: int, minutes: float | None = None) -> bool:
         """See ``TrainingLoop.train``; only the first process shows its progress."""
         if self.peers.leads:
-            return super().train(iterations)
+            return super().train(iterations, minutes)
         with contextlib.redirect_stderr(io.StringIO()):
-            return super().train(iterations)
+            return super().train(iterations, minutes)
+
+    def _share_done(self, iterations: int, begun: float, minutes: float | None) -> float:
+        """The first process's clock counts: all must end after the same iteration, with the same settings."""
+        share = super()._share_done(iterations, begun, minutes)
+        return share if minutes is None else self.peers.first(share, self.device)
 
     def describe_policy(self) -> dict[str, float]:
         """Mean standard deviation of the actions."""

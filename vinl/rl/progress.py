@@ -16,8 +16,8 @@ class TrainingProgress:
     """Shows iterations done, the time left and a few figures.
 
     Args:
-        total: iterations of the whole run.
-        done: iterations that were done before.
+        total: iterations of the whole run, or its seconds.
+        done: of them before.
     """
 
     def __init__(self, total: int, done: int = 0, console: Console | None = None) -> None:
@@ -46,7 +46,7 @@ class TrainingProgress:
         self._bar.stop()
 
     def show(self, iteration: int, figures: dict[str, str]) -> None:
-        """Move on to ``iteration``."""
+        """Move on to ``iteration`` (or second)."""
         text = "  ".join(f"{name} {value}" for name, value in figures.items())
         self._bar.update(self._task, completed=iteration, figures=text)
         now = time.monotonic()
