@@ -62,7 +62,9 @@ def main(argv: list[str]) -> int:
     if options.resume and options.from_policy:
         raise InputError("--from starts a new run and --resume goes on with an old one; give one of them")
     if options.resume and (options.overrides or options.config or options.out or options.num_envs or options.seed):
-        raise InputError("--resume goes on with the run's own config; only --iterations, --minutes and --device may be given")
+        raise InputError(
+            "--resume goes on with the run's own config; only --iterations, --minutes and --device may be given"
+        )
     from vinl.policies.device import choose_device
 
     device = options.device

@@ -71,7 +71,9 @@ def main(argv: list[str]) -> int:
         raise InputError("--from starts a new run and --resume goes on with an old one; give one of them")
     fresh = options.overrides or options.config != "default" or options.out or options.num_envs or options.seed
     if options.resume and fresh:
-        raise InputError("--resume goes on with the run's own config; only --iterations, --minutes and --device may be given")
+        raise InputError(
+            "--resume goes on with the run's own config; only --iterations, --minutes and --device may be given"
+        )
     device = _choose_device(options)
 
     from vinl.config.loader import load_config
