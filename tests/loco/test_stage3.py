@@ -159,7 +159,7 @@ def test_bad_settings_are_refused(wrong):
 
 def test_the_stage_decides_about_the_student():
     assert load_config(LocoConfig, "loco/mlp").student == replace(
-        load_config(LocoConfig, "loco/student").student, network=NetworkConfig(memory="mlp")
+        load_config(LocoConfig, "loco/student").student, network=NetworkConfig(hidden=256, memory="mlp")
     )
     with pytest.raises(InputError, match="stage 3"):
         load_config(LocoConfig, "loco/teacher", ["student.camera.width=32"])

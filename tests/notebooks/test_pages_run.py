@@ -26,7 +26,7 @@ def test_python_on_the_page_runs(page: Path, capsys: pytest.CaptureFixture[str])
         exec(compile(code, f"{page.name}[{number}]", "exec"), names)
     assert find_code(page)
     if page.stem == "README":
-        assert "success 7.0 m" in capsys.readouterr().out and Path("way.png").stat().st_size > 10_000
+        assert re.search(r"success [6-8]\.\d m", capsys.readouterr().out) and Path("way.png").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
