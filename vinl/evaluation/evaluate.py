@@ -20,7 +20,7 @@ from vinl.evaluation.senses import check_cameras
 from vinl.evaluation.senses import check_senses as check_senses
 from vinl.evaluation.store import Store
 from vinl.evaluation.video import FilmJob
-from vinl.evaluation.work import Row, Shared, cut_jobs, list_keys, run_job
+from vinl.evaluation.work import Row, Shared, cut_jobs, list_keys, longest_first, run_job
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
 from vinl.world.clutter import CLUTTER
@@ -129,7 +129,7 @@ def evaluate_rows(
             missing = [key for key in wanted if key not in store.done or key in filmed]
             if store.journal is not None and missing:
                 store.journal.begin(workers)
-            jobs += cut_jobs(k, row, protocol.plans, wanted, missing, filmed, workers)
+            jobs += cut_jobs(k, row, protocol.plans, routes, wanted, missing, filmed, workers)
         todo = sum(len(job.cells) for job in jobs)
         total, done = len(wanted) * len(rows), len(wanted) * len(rows) - todo
 
@@ -140,6 +140,7 @@ def evaluate_rows(
             on_progress("walk", done, total)
 
         on_progress("walk", done, total)
+        jobs = longest_first(jobs, routes)
         shared = Shared(rows, protocol.plans, routes, protocol.config)
         with Crew(min(workers, max(len(jobs), 1)), shared) as crew:
             units = crew.run(run_job, jobs, add)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import TypeVar
 
 from vinl.evaluation.batches import is_steady, is_steady_navigator
 from vinl.evaluation.config import EvaluationConfig
@@ -18,10 +20,12 @@ from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan
 from vinl.world.start_goal import StartGoal
 
+T = TypeVar("T")
+
 LARGEST = 24
 """Episodes in a piece of work at most: three batches of the networks; the robots of more would wait for each other."""
 
-_PIECES = 4
+_PIECES = 3
 """So many pieces of work for each worker, so that none is idle for long at the end."""
 
 
@@ -72,6 +76,7 @@ def cut_jobs(
     row: int,
     who: Row,
     plans: Sequence[FloorPlan],
+    routes: Sequence[Sequence[StartGoal]],
     wanted: Sequence[Key],
     missing: Collection[Key],
     filmed: Collection[Key],
@@ -79,7 +84,8 @@ def cut_jobs(
 ) -> list[Job]:
     """The pieces of work of a row.
 
-    Where an episode does not depend on those that it is run with, pieces are as large as the number of workers allows.
+    Where an episode does not depend on those that it is run with, pieces are as large as the number of workers allows,
+    and hold episodes whose ways are about as long: a network is asked for as many robots when few of them still walk.
     With a policy of one's own they are all episodes of a plan and a seed, whatever is missing of them.
     """
     steady = is_steady(who.locomotor) and is_steady_navigator(who.navigator)
@@ -89,14 +95,26 @@ def cut_jobs(
         cells = [(seed, k) for name, seed, k in wanted if name == plan.name]
         lacking = {(seed, k) for name, seed, k in missing if name == plan.name}
         if steady:
-            cells = [cell for cell in cells if cell in lacking]
-            parts = [cells[first : first + size] for first in range(0, len(cells), size)]
+            cells = sorted(lacking, key=lambda cell: (-routes[number][cell[1]].geodesic_m, cell))
+            parts = split_evenly(cells, size)
         else:
             parts = [[cell for cell in cells if cell[0] == seed] for seed in sorted({seed for seed, _ in lacking})]
         for part in parts:
             shown = tuple(cell for cell in part if (plan.name, *cell) in filmed)
             jobs.append(Job(row, number, tuple(part), shown, not steady))
     return jobs
+
+
+def split_evenly(cells: Sequence[T], largest: int) -> list[Sequence[T]]:
+    """As few pieces as possible of at most so many cells, none larger than another by more than one."""
+    count = -(-len(cells) // largest)
+    bounds = [len(cells) * k // count for k in range(count + 1)] if count else []
+    return [cells[a:b] for a, b in pairwise(bounds)]
+
+
+def longest_first(jobs: Sequence[Job], routes: Sequence[Sequence[StartGoal]]) -> list[Job]:
+    """The jobs in an order in which no worker begins a long one when the others have nothing left to do."""
+    return sorted(jobs, key=lambda job: -max(routes[job.plan][k].geodesic_m for _, k in job.cells))
 
 
 def run_job(context: Context, job: Job) -> dict[Key, Episode]:
