@@ -52,6 +52,8 @@ class EvaluationConfig:
         stuck_distance: ... the robot ended nearer than this to where it was [m].
         ceiling: height of a ceiling that the cameras see [m]; none by default.
         min_metres: episodes shorter than this do not count in the rates per metre [m] [paper: 1 m].
+        recovery: robots of a learned navigator that have not moved or turned for 3 s turn away and walk on, whatever
+            it says (``vinl.evaluation.recovery``). The oracle always does so.
         oracle: how the shortest-path follower walks.
     """
 
@@ -66,6 +68,7 @@ class EvaluationConfig:
     stuck_distance: float = 0.5
     ceiling: float | None = None
     min_metres: float = 1.0
+    recovery: bool = True
     oracle: OracleConfig = field(default_factory=OracleConfig)
 
     def __post_init__(self) -> None:

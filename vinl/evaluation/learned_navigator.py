@@ -11,12 +11,16 @@ from jaxtyping import Float
 from vinl.config.errors import InputError
 from vinl.evaluation.navigator import Task
 from vinl.evaluation.odometry import measure_twist
+from vinl.evaluation.recovery import Recovery
 from vinl.policies.card import NAVIGATION_TABLE, PolicyCard, find_previous
 from vinl.policies.policy import Policy
 from vinl.policies.velocity_range import VelocityRange
 from vinl.robot.cameras import Camera
 
 _DISTANCE_SCALE = float(NAVIGATION_TABLE[0]["scale"][0])
+
+_RECOVERY_SPEED = 0.5
+"""Forward speed of a robot that is being freed [m/s]: half of what it can do."""
 
 
 class LearnedNavigator:
@@ -29,6 +33,7 @@ class LearnedNavigator:
     Args:
         policy: observes (n, 5 or 7): distance / 5 m, cosine and sine of the bearing, and its last step; and depth.
         period: between two decisions [s].
+        recover: free robots that have not moved for a while (``Recovery``), whatever the policy says.
 
     Attributes:
         policy: as given.
@@ -38,7 +43,7 @@ class LearnedNavigator:
         InputError: the policy is of another kind.
     """
 
-    def __init__(self, policy: Policy, period: float = 0.5) -> None:
+    def __init__(self, policy: Policy, period: float = 0.5, recover: bool = True) -> None:
         if policy.card.kind != "navigation":
             raise InputError(
                 f"{policy.card.name} is a {policy.card.kind} policy; a navigator (--nav) is oracle or a navigation "
@@ -50,6 +55,7 @@ class LearnedNavigator:
         self._period, self._previous = period, find_previous(policy.card)
         self._last = np.zeros((0, 2), np.float32)
         self._pose: np.ndarray | None = None
+        self._recover, self._recovery = recover, self._watch(0)
 
     @property
     def card(self) -> PolicyCard:
@@ -61,6 +67,7 @@ class LearnedNavigator:
         self.policy.reset(len(episodes))
         self._last = np.zeros((len(episodes), 2), np.float32)
         self._pose = None
+        self._recovery = self._watch(len(episodes))
 
     def act(self, observation: dict[str, Any]) -> Float[np.ndarray, "n 2"]:
         """See ``Navigator.act``; reads ``goal``, ``depth`` and, to see how far the robot came, ``pose``."""
@@ -73,7 +80,15 @@ class LearnedNavigator:
         vector = np.concatenate(parts, 1)
         action = self.policy.act(vector) if self.camera is None else self.policy.act(vector, observation["depth"])
         self._last = np.clip(np.asarray(action, np.float32), -1.0, 1.0)
-        return self._range.velocity(self._last)
+        choice = self._range.velocity(self._last)
+        if not self._recover:
+            return choice
+        choice, freed = self._recovery.correct(np.asarray(observation["pose"], np.float64), choice)
+        self._last[freed] = self._range.action(choice[freed])
+        return choice
+
+    def _watch(self, n: int) -> Recovery:
+        return Recovery(n, _RECOVERY_SPEED, float(self._range.velocity(np.ones((1, 2), np.float32))[0, 1]))
 
     def _measure(self, pose: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
         """The motion since the last decision in units of the action; zero at the first."""

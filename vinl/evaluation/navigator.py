@@ -83,7 +83,7 @@ def load_navigator(name: str | Path, config: EvaluationConfig, device: str = "cp
         raise InputError(
             f"unknown navigator {str(name)!r}{closest(bare, known)}; known: {', '.join(known)}; or give a policy folder"
         )
-    return LearnedNavigator(load_policy(name, device), config.navigation_period * CONTROL_DT)
+    return LearnedNavigator(load_policy(name, device), config.navigation_period * CONTROL_DT, config.recovery)
 
 
 def check_choice(choice: Any, n: int, navigator: Navigator) -> Float[np.ndarray, "n 2"]:

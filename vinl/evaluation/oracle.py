@@ -11,18 +11,13 @@ from jaxtyping import Float
 from vinl.config.errors import InputError
 from vinl.evaluation.config import OracleConfig
 from vinl.evaluation.navigator import Task
+from vinl.evaluation.recovery import Recovery
 from vinl.evaluation.way import Way, plan_way
 from vinl.robot.cameras import Camera
 
 _SLOWEST = 0.6
 """Share of the speed and of the look-ahead that is left in the narrowest gaps: at 2 Hz and full speed the robot would
 walk through half of a doorway between two decisions."""
-
-_STILL, _STILL_M, _STILL_RAD = 6, 0.12, 0.2
-"""A robot that in so many decisions moved and turned less than this is stuck ..."""
-
-_FREEING = 4
-"""... and for so many decisions does something else: it may not walk backwards, so it turns away, then goes ahead."""
 
 
 class OracleNavigator:
@@ -35,15 +30,14 @@ class OracleNavigator:
         self._tasks: Sequence[Task] = []
         self._ways: list[Way] = []
         self._along: list[int] = []
-        self._past: list[np.ndarray] = []
-        self._freeing = np.zeros(0, dtype=int)
+        self._recovery = Recovery(0, self.config.speed, self.config.turn_rate)
 
     def reset(self, episodes: Sequence[Task]) -> None:
         """Plan a way for every episode."""
         self._tasks = list(episodes)
         self._ways = [plan_way(task.space, task.route.start, task.route.goal) for task in self._tasks]
         self._along = [0] * len(self._tasks)
-        self._past, self._freeing = [], np.zeros(len(self._tasks), dtype=int)
+        self._recovery = Recovery(len(self._tasks), self.config.speed, self.config.turn_rate)
 
     def act(self, observation: dict[str, Any]) -> Float[np.ndarray, "n 2"]:
         """See ``Navigator.act``; reads ``pose``."""
@@ -58,23 +52,7 @@ class OracleNavigator:
         # full speed straight ahead, none at the error where it turns on the spot; slower over the last metre
         ahead = np.clip(1.0 - np.abs(error) / c.turn_in_place, 0.0, 1.0) ** 0.5
         speed = c.speed * ahead * np.clip(0.3 + 0.7 * left, 0.3, 1.0) * ease
-        return self._free_stuck(pose, np.stack([speed, turn], 1))
-
-    def _free_stuck(self, pose: np.ndarray, choice: np.ndarray) -> np.ndarray:
-        """Have the robots that have not moved for a while turn the other way, then walk straight ahead."""
-        self._past = [*self._past, pose.copy()][-_STILL - 1 :]
-        if len(self._past) > _STILL:
-            change = np.array(self._past) - pose
-            turned = np.abs((change[..., 2] + np.pi) % (2 * np.pi) - np.pi).max(0)
-            still = (np.linalg.norm(change[..., :2], axis=-1).max(0) < _STILL_M) & (turned < _STILL_RAD)
-            self._freeing[still & (self._freeing == -_STILL)] = _FREEING
-        away = np.where(choice[:, 1] > 0, -1.0, 1.0) * self.config.turn_rate
-        turns, walks = self._freeing > _FREEING // 2, (self._freeing > 0) & (self._freeing <= _FREEING // 2)
-        choice[turns] = np.stack([np.zeros(len(pose)), away], 1)[turns]
-        choice[walks] = self.config.speed, 0.0
-        # below zero it counts the decisions until it may be called stuck again
-        self._freeing = np.maximum(self._freeing - 1, -_STILL)
-        return choice
+        return self._recovery.correct(pose, np.stack([speed, turn], 1))[0]
 
     def _aim(self, k: int, xy: np.ndarray) -> tuple[np.ndarray, float, float]:
         """The point of the way to head for, the length of the way that is left [m], and the share of the speed."""
