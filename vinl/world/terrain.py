@@ -15,6 +15,7 @@ from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
 from vinl.world.joined import draw_rows, join_blocks, joined_share
+from vinl.world.rooms_tile import draw_rooms
 
 RESOLUTION = 0.05
 """Pitch of the height field [m]."""
@@ -36,7 +37,7 @@ class TerrainConfig:
     """Which tiles lie where. Levels run along x, columns along y; every column holds one type.
 
     Attributes:
-        slope, rough_slope, stairs_up, stairs_down, discrete, walls, blocks: share of the columns of each type.
+        slope, rough_slope, stairs_up, stairs_down, discrete, walls, blocks, rooms: share of the columns of each type.
         levels: rows of rising difficulty; difficulty of level k is k / levels, 0 to 0.9 for ten [ViNL code].
         columns: columns of tiles.
         seed: of everything random in the tiles.
@@ -45,7 +46,7 @@ class TerrainConfig:
         tall_density: furniture-like tall boxes per m2 on ``blocks`` and ``walls`` tiles beyond the first level.
         start_clear: half-width of the square around the start without blocks [m].
         joined: share of the blocks that touch or overlap another: end to end, at an angle or side by side.
-        wall_blocks: blocks on ``walls`` tiles, as a share of those on ``blocks`` tiles.
+        wall_blocks: blocks on ``walls`` and ``rooms`` tiles, as a share of those on ``blocks`` tiles.
         row_density: rows of blocks per m2 on ``blocks`` tiles beyond the first level, the same on all of these.
         row_length: range of their lengths [m].
         first_height: range of the blocks' heights on the first level [m], from which they grow evenly to
@@ -59,6 +60,7 @@ class TerrainConfig:
     discrete: float = 0.20
     walls: float = 0.0
     blocks: float = 0.0
+    rooms: float = 0.0
     levels: int = 10
     columns: int = 20
     seed: int = 0
@@ -91,7 +93,7 @@ class TerrainConfig:
 
     def shares(self) -> dict[str, float]:
         """Share of every tile type, in the order of the columns."""
-        names = ("slope", "rough_slope", "stairs_up", "stairs_down", "discrete", "walls", "blocks")
+        names = ("slope", "rough_slope", "stairs_up", "stairs_down", "discrete", "walls", "blocks", "rooms")
         return {name: getattr(self, name) for name in names}
 
     def heights_at(self, level: int) -> tuple[float, float]:
@@ -229,7 +231,11 @@ def build_terrain(config: TerrainConfig) -> Terrain:
                 ground.heights[i : i + CELLS, j : j + CELLS] = tiles[kind]()
                 continue
             none = np.zeros((0, 2))
-            if kind == "walls":
+            if kind == "rooms":
+                tall.append(Boxes(draw_rooms(rng, TILE, difficulty).rows + shift))
+                if config.wall_blocks > 0:
+                    blocks.append(_tile_blocks(config, rng, k, middle, none, config.wall_blocks))
+            elif kind == "walls":
                 count = round(difficulty * 0.15 * TILE**2)
                 here = scatter_centres(rng, count, TILE / 2 - 0.3, 1.0, 1.2, none)
                 boxes = [draw_tall(rng, here[::2], long=True), draw_tall(rng, here[1::2], long=False)]
