@@ -44,7 +44,7 @@ def test_goal_and_last_action_in_velocities_out(two_rooms: FloorPlan) -> None:
     task = Task(FreeSpace(two_rooms), sample_start_goals(two_rooms, 1, np.random.default_rng(0), 2.0)[0])
     navigator.reset([task, task])
     goal = np.array([[10.0, 1.0, 0.0], [2.5, 0.0, 1.0]])
-    observation = {"goal": goal, "depth": torch.full((2, 8, 12), 5.0)}
+    observation = {"goal": goal, "depth": torch.full((2, 8, 12), 5.0), "pose": np.zeros((2, 3))}
     choice = navigator.act(observation)
     np.testing.assert_allclose(choice, [[0.8, 0.0], [0.0, np.pi / 3]], atol=1e-6)  # beyond the range: held to 60 deg/s
     navigator.act(observation)
@@ -53,6 +53,26 @@ def test_goal_and_last_action_in_velocities_out(two_rooms: FloorPlan) -> None:
     np.testing.assert_allclose(vector[0], [[2.0, 1, 0, 0, 0], [0.5, 0, 1, 0, 0]])
     np.testing.assert_allclose(later[0, :, 3:], [[0.6, 0.0], [-1.0, 1.0]])
     assert fresh.all() and not stale.any()
+
+
+@pytest.mark.parametrize("recover", [True, False])
+def test_a_robot_that_does_not_come_on_is_freed_and_the_policy_is_told(two_rooms: FloorPlan, recover: bool) -> None:
+    policy = make_guide()
+    navigator = LearnedNavigator(policy, recover=recover)
+    task = Task(FreeSpace(two_rooms), sample_start_goals(two_rooms, 1, np.random.default_rng(0), 2.0)[0])
+    navigator.reset([task, task])
+    choices = []
+    for step in range(9):
+        poses = np.array([[0.0, 0.0, 0.0], [0.3 * step, 0.0, 0.0]])  # the first stands, the second walks
+        goal = np.array([[10.0, 1.0, 0.0], [10.0, 1.0, 0.0]])
+        observation = {"goal": goal, "depth": torch.full((2, 8, 12), 5.0), "pose": poses}
+        choices.append(navigator.act(observation))
+    told = policy.network.seen[8][1][0, :, 3:]  # type: ignore[index]
+    if recover:
+        np.testing.assert_allclose(choices[7], [[0.0, np.pi / 3], [0.8, 0.0]], atol=1e-6)
+        np.testing.assert_allclose(told, [[-1.0, 1.0], [0.6, 0.0]], atol=1e-6)
+    else:
+        np.testing.assert_allclose(choices[7], [[0.8, 0.0], [0.8, 0.0]], atol=1e-6)
 
 
 def test_scripted_navigator_walks_an_episode(two_rooms: FloorPlan) -> None:
