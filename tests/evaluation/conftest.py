@@ -25,11 +25,15 @@ def two_rooms() -> FloorPlan:
     return assemble_floorplan("two_rooms", "test", Boxes(np.array(walls)), table, inside, frame)
 
 
+def small_network() -> MapActor:
+    """With layers of 8 a row's place in the batch would matter to the last bits (AMD EPYC, torch 2.13)."""
+    return MapActor(encoder=(16,), code=8, actor=(16,))
+
+
 @pytest.fixture(scope="session")
 def standing() -> LocomotionPolicy:
     """A policy whose action is always zero."""
-    # with layers of 8 a row's place in the batch matters to the last bits (AMD EPYC, torch 2.13)
-    network = MapActor(encoder=(16,), code=8, actor=(16,))
+    network = small_network()
     with torch.no_grad():
         for parameter in network.parameters():
             parameter.zero_()
@@ -40,6 +44,5 @@ def standing() -> LocomotionPolicy:
 def trotting() -> LocomotionPolicy:
     """An untrained policy: it moves its legs somehow, so that two runs have something to agree on."""
     torch.manual_seed(0)
-    # with layers of 8 a row's place in the batch matters to the last bits (AMD EPYC, torch 2.13)
-    network = MapActor(encoder=(16,), code=8, actor=(16,))
+    network = small_network()
     return LocomotionPolicy(network, locomotion_card("trotting", network.describe()))

@@ -66,7 +66,7 @@ def test_what_does_not_fit_is_one_line(walked: Path, tmp_path: Path, capsys: pyt
     for folders, words in (
         ([one, two], "2 of 8 episodes are missing"),
         ([one, two], "give the folder of --shard 3/3 too"),
-        ([one, two, three, double], "; give each share once"),
+        ([one, two, three, double], "both hold episode 0 of seed 1 in old_town; give each share once"),
         ([one, two, cut], "a run was interrupted: start its command again"),
         ([one, two, other], "do not belong together: config.evaluation.time_limit is 0.3"),
         ([one, one], "given twice"),

@@ -92,12 +92,12 @@ def cut_jobs(
     size = max(1, min(LARGEST, -(-len(missing) // (workers * _PIECES))))
     jobs = []
     for number, plan in enumerate(plans):
-        cells = [(seed, k) for name, seed, k in wanted if name == plan.name]
         lacking = {(seed, k) for name, seed, k in missing if name == plan.name}
         if steady:
             cells = sorted(lacking, key=lambda cell: (-routes[number][cell[1]].geodesic_m, cell))
             parts = split_evenly(cells, size)
         else:
+            cells = [(seed, k) for name, seed, k in wanted if name == plan.name]
             parts = [[cell for cell in cells if cell[0] == seed] for seed in sorted({seed for seed, _ in lacking})]
         for part in parts:
             shown = tuple(cell for cell in part if (plan.name, *cell) in filmed)
