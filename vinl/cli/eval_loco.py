@@ -20,11 +20,11 @@ class Options:
     compare: tuple[str, ...] = ()
     """Several policies in place of --policy: all on the same courses, one table."""
     terrain: str = "flat"
-    """flat, rough (the terrains of stage 1) or blocks."""
+    """flat, rough (the terrains of stage 1), blocks or rooms (small ones, with corners, doorways and blocks)."""
     commands: str | None = None
-    """turns (0.3-1 m/s and up to 1 rad/s; the default on blocks), straight, spin (on the spot), navigator (0-1 m/s and
-    up to 60 deg/s, changed every 0.5-4 s, standing and turning on the spot included), trained (what the policy was
-    trained for; the default elsewhere) or forward (the same without sideways)."""
+    """turns (0.3-1 m/s and up to 1 rad/s; the default on blocks), straight, spin (on the spot), navigator (0-1 m/s
+    and up to 60 deg/s, changed every 0.5-4 s, standing and turning on the spot included; the default in rooms),
+    trained (what the policy was trained for; the default elsewhere) or forward (the same without sideways)."""
     robots: int = 64
     """How many robots for each policy."""
     seconds: float = 20.0
@@ -32,9 +32,9 @@ class Options:
     seed: int = 0
     """Of terrain, starts and commands."""
     density: float = 1.0
-    """Blocks per m2, for blocks; 0 is level floor under the same rules."""
+    """Blocks per m2, for blocks and, on level 9 (fewer below), for rooms; 0 is no block under the same rules."""
     level: int | None = None
-    """Level of all robots, 0 to 9, for rough; 1 to 9 by turns if not given."""
+    """Level of all robots, 0 to 9, for rough and rooms; 1 to 9 by turns if not given."""
     step: bool = False
     """Also let every policy walk straight over one block: step.png (heights of the feet) and step.mp4."""
     step_height: float = 0.15

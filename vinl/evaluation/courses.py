@@ -62,12 +62,12 @@ COMMANDS = ("trained", "forward", *FIXED)
 
 
 def choose_commands(name: str | None, terrain: str) -> str:
-    """The commands of that name; without one ``turns`` on blocks and ``trained`` elsewhere.
+    """The commands of that name; without one ``turns`` on blocks, ``navigator`` in rooms and ``trained`` elsewhere.
 
     Raises:
         InputError: the name is unknown.
     """
-    name = name or ("turns" if terrain == "blocks" else "trained")
+    name = name or {"blocks": "turns", "rooms": "navigator"}.get(terrain, "trained")
     if name not in COMMANDS:
         raise InputError(f"--commands {name!r} is unknown{closest(name, COMMANDS)}; known: {', '.join(COMMANDS)}")
     return name

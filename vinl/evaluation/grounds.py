@@ -1,8 +1,8 @@
-"""The grounds that a locomotor is tried on: level floor, the stage-1 terrains, scattered blocks."""
+"""The grounds that a locomotor is tried on: level floor, the stage-1 terrains, scattered blocks, small rooms."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -18,15 +18,21 @@ from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, HeightField, flat_field, raise_boxes
 from vinl.world.mesh import box_mesh, floor_mesh, heightfield_mesh, join_meshes
-from vinl.world.terrain import TILE, TerrainConfig, build_terrain, draw_blocks, scatter_centres
+from vinl.world.terrain import TILE, Terrain, TerrainConfig, build_terrain, draw_blocks, scatter_centres
 
-TERRAINS = ("flat", "rough", "blocks")
+TERRAINS = ("flat", "rough", "blocks", "rooms")
 
 FIELD = 12.0
 """Half the side of the square that the blocks cover [m]."""
 
 UNSEEN = 7919
 """Added to the seed of the terrain, so that it is not the one of the training."""
+
+_ROOM_COLUMNS = 8
+"""Tiles of rooms on each level."""
+
+_ROOM_SPREAD = 0.3
+"""Half-width of the square that robots start in, in the middle room of a tile [m]: as in training."""
 
 _RESOLUTION = 0.05
 _HORIZON = GridFrame(-1000.0, -1000.0, 10.0, (201, 201))
@@ -37,9 +43,10 @@ class GroundConfig:
     """Which ground.
 
     Attributes:
-        terrain: ``flat``, ``rough`` (the five types of stage 1) or ``blocks``.
-        density: blocks per m2, for ``blocks``; 0 is level floor under the same rules.
-        level: level of all robots, for ``rough``; spread evenly over levels 1 to 9 if None.
+        terrain: ``flat``, ``rough`` (the five types of stage 1), ``blocks`` or ``rooms`` (walls close by, and blocks).
+        density: blocks per m2, for ``blocks`` and, on level 9 of them and fewer below, for ``rooms``; 0 is no block
+            under the same rules.
+        level: level of all robots, for ``rough`` and ``rooms``; spread evenly over levels 1 to 9 if None.
         seed: of the terrain.
         kp, kd: gains of the joints.
     """
@@ -58,8 +65,8 @@ class GroundConfig:
             raise InputError(f"--density must lie between 0 and 4 blocks per m2, got {self.density:g}")
         if self.level is not None and not 0 <= self.level <= 9:
             raise InputError(f"--level must lie between 0 and 9, got {self.level}")
-        if self.level is not None and self.terrain != "rough":
-            raise InputError(f"--level is for --terrain rough, not for {self.terrain}")
+        if self.level is not None and self.terrain not in ("rough", "rooms"):
+            raise InputError(f"--level is for --terrain rough and rooms, not for {self.terrain}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +82,7 @@ class Ground:
         reach: a robot that is farther from home than this along x or y [m] is put back.
         spread: half-width of the square around home that robots start in [m].
         blocks: the blocks, which starts keep clear of.
+        walls: what stands on the ground beside blocks.
     """
 
     model: mujoco.MjModel
@@ -85,6 +93,7 @@ class Ground:
     reach: float
     spread: float
     blocks: Blocks
+    walls: Boxes = field(default_factory=Boxes.empty)
 
     def on_block(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
         """Whether points [m] lie on a block, to half a cell of 5 cm."""
@@ -96,14 +105,15 @@ class Ground:
         if not len(self.blocks):
             return None
         x, y = self.field.frame.centres()
-        inside = np.ix_(np.abs(y) < self.reach, np.abs(x) < self.reach)
-        return float((self.field.labels[inside] == BLOCK).mean())
+        squares = [np.ix_(np.abs(y - home[1]) < self.reach, np.abs(x - home[0]) < self.reach) for home in self.homes]
+        return float(np.mean([(self.field.labels[square] == BLOCK).mean() for square in squares]))
 
     def mesh(self) -> Mesh:
-        """What a camera sees: blocks as boxes on a plane, or the height field."""
-        if self.field.heights.any() and not len(self.blocks):
+        """What a camera sees: blocks and walls as boxes on a plane, or the height field."""
+        boxes = self.blocks.boxes() + self.walls
+        if self.field.heights.any() and not len(boxes):
             return heightfield_mesh(self.field.heights, self.field.frame)
-        return join_meshes(box_mesh(self.blocks.boxes()), floor_mesh(_HORIZON))
+        return join_meshes(box_mesh(boxes), floor_mesh(_HORIZON))
 
 
 class FieldScan(GroundScan):
@@ -122,6 +132,8 @@ def build_ground(config: GroundConfig) -> Ground:
     middle, none = np.zeros((1, 3)), np.array([-1])
     if config.terrain == "rough":
         return _build_rough(config)
+    if config.terrain == "rooms":
+        return _build_rooms(config)
     cells = round(2 * (FIELD + 2) / _RESOLUTION) + 1
     field = flat_field(GridFrame(-(FIELD + 2), -(FIELD + 2), _RESOLUTION, (cells, cells)))
     blocks = Blocks.empty()
@@ -140,12 +152,29 @@ def build_ground(config: GroundConfig) -> Ground:
 
 def _build_rough(config: GroundConfig) -> Ground:
     terrain = build_terrain(TerrainConfig(seed=UNSEEN + config.seed))
-    model = build_scene(Boxes.empty(), Boxes.empty(), terrain.ground, kp=config.kp, kd=config.kd)
+    return _on_tiles(
+        config, terrain, build_scene(Boxes.empty(), Boxes.empty(), terrain.ground, config.kp, config.kd), 0.5
+    )
+
+
+def _build_rooms(config: GroundConfig) -> Ground:
+    kinds = dict.fromkeys(TerrainConfig().shares(), 0.0) | {"rooms": 1.0}
+    terrain = build_terrain(
+        TerrainConfig(
+            seed=UNSEEN + config.seed, columns=_ROOM_COLUMNS, block_density=config.density, wall_blocks=1.0, **kinds
+        )
+    )
+    model = build_scene(terrain.tall, terrain.blocks.boxes(), kp=config.kp, kd=config.kd)
+    return _on_tiles(config, terrain, model, _ROOM_SPREAD)
+
+
+def _on_tiles(config: GroundConfig, terrain: Terrain, model: mujoco.MjModel, spread: float) -> Ground:
+    """Robots start in the middles of tiles, on the level asked for or on all beyond the first."""
     # the first level is level floor, so that 9, 8 ... 1, 9 ... has a mean of at least 5 for any number of robots
     chosen = [config.level] if config.level is not None else list(range(9, 0, -1))
     columns = len(terrain.kinds)
-    # 7 has no divisor in common with 20 columns: types and levels are mixed
+    # 7 has no divisor in common with 20 and 8 columns: types and levels are mixed
     pairs = [(chosen[k % len(chosen)], (7 * k) % columns) for k in range(len(chosen) * columns)]
     homes = np.array([terrain.starts[level, column] for level, column in pairs])
     levels, kinds = np.array([level for level, _ in pairs]), [terrain.kinds[column] for _, column in pairs]
-    return Ground(model, terrain.ground, homes, levels, kinds, TILE / 2, 0.5, Blocks.empty())
+    return Ground(model, terrain.ground, homes, levels, kinds, TILE / 2, spread, terrain.blocks, terrain.tall)
