@@ -36,6 +36,23 @@ def test_rough_ground_has_levels() -> None:
     assert set(build_ground(GroundConfig("rough", 1.0, 3, 0, 40.0, 2.0)).levels) == {3}
 
 
+def test_in_rooms_walls_stand_close_to_every_start_and_cameras_see_them(standing: LocomotionPolicy) -> None:
+    ground = build_ground(GroundConfig("rooms", 1.0, None, 0, 40.0, 2.0))
+    bare = build_ground(GroundConfig("rooms", 0.0, 9, 0, 40.0, 2.0))
+    assert set(ground.kinds) == {"rooms"} and set(ground.levels) == set(range(1, 10))
+    assert not len(bare.blocks) and set(bare.levels) == {9}
+    starts = np.array(
+        [[s.x, s.y] for robot in range(72) for s in [Course(ground, FIXED["turns"], 0, robot, 9).draw_start()]]
+    )
+    gaps = ground.walls.distances(starts).min(0)
+    assert gaps.min() > 0.3 and gaps.max() < 1.5
+    assert len(ground.mesh()[1]) > 12 * len(ground.walls)
+    assert choose_commands(None, "rooms") == "navigator"
+    assert 0 < (ground.covered() or 0) < 0.1 and bare.covered() is None
+    figures = evaluate_locomotor(standing, "rooms", 2, 0.5).aggregate
+    assert figures["falls"] == 0 and figures["mean_level"] is not None
+
+
 def test_commands_are_those_of_the_training_but_not_faster(standing: LocomotionPolicy) -> None:
     assert command_ranges("trained", [standing]).forward == (-1.0, 1.0)
     standing.card.training["commands"] = {"forward": [0.0, 1.0], "left": [0.0, 0.0], "yaw_rate": [-1.05, 1.05]}
@@ -114,6 +131,8 @@ def test_figures_of_known_records() -> None:
         ({"terrain": "blocks", "density": -1.0}, "--density"),
         ({"terrain": "rough", "level": 10}, "--level"),
         ({"level": 3}, "--level"),
+        ({"terrain": "blocks", "level": 3}, "--level"),
+        ({"terrain": "rooms", "level": -1}, "--level"),
         ({"commands": "turn"}, "did you mean"),
     ],
 )

@@ -158,10 +158,18 @@ def _build_rough(config: GroundConfig) -> Ground:
 
 
 def _build_rooms(config: GroundConfig) -> Ground:
-    kinds = dict.fromkeys(TerrainConfig().shares(), 0.0) | {"rooms": 1.0}
     terrain = build_terrain(
         TerrainConfig(
-            seed=UNSEEN + config.seed, columns=_ROOM_COLUMNS, block_density=config.density, wall_blocks=1.0, **kinds
+            slope=0.0,
+            rough_slope=0.0,
+            stairs_up=0.0,
+            stairs_down=0.0,
+            discrete=0.0,
+            rooms=1.0,
+            columns=_ROOM_COLUMNS,
+            seed=UNSEEN + config.seed,
+            block_density=config.density,
+            wall_blocks=1.0,
         )
     )
     model = build_scene(terrain.tall, terrain.blocks.boxes(), kp=config.kp, kd=config.kd)
