@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -93,7 +93,7 @@ class Ground:
     reach: float
     spread: float
     blocks: Blocks
-    walls: Boxes = field(default_factory=Boxes.empty)
+    walls: Boxes
 
     def on_block(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
         """Whether points [m] lie on a block, to half a cell of 5 cm."""
@@ -147,7 +147,7 @@ def build_ground(config: GroundConfig) -> Ground:
     model = build_scene(Boxes.empty(), blocks.boxes(), kp=config.kp, kd=config.kd)
     # at density 0 robots are put back as on blocks, so that both trials are alike but for the blocks
     reach = FIELD - 1 if config.terrain == "blocks" else np.inf
-    return Ground(model, field, middle, none, [config.terrain], reach, FIELD * 2 / 3, blocks)
+    return Ground(model, field, middle, none, [config.terrain], reach, FIELD * 2 / 3, blocks, Boxes.empty())
 
 
 def _build_rough(config: GroundConfig) -> Ground:
