@@ -62,7 +62,7 @@ def cross_block(policy: Policy, height: float = 0.15, speed: float = 0.5, crossi
     raise_boxes(field, block.boxes(), BLOCK)
     action = policy.card.action
     model = build_scene(Boxes.empty(), block.boxes(), kp=float(action["kp"]), kd=float(action["kd"]))
-    ground = Ground(model, field, np.zeros((1, 3)), np.array([-1]), ["step"], np.inf, 0.0, block)
+    ground = Ground(model, field, np.zeros((1, 3)), np.array([-1]), ["step"], np.inf, 0.0, block, Boxes.empty())
     touches, walkers = BlockTouches.none(crossings), [Walker(model) for _ in range(crossings)]
     feet = [model.geom(f"{leg}_foot").id for leg in LEGS]
     for k, walker in enumerate(walkers):
