@@ -1,0 +1,48 @@
+"""The mean of two policies."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from vinl.config.errors import InputError
+from vinl.policies.average import average_policies
+from vinl.policies.io import load_policy, save_policy
+
+
+def test_weights_lie_between_and_the_card_names_both(tmp_path) -> None:
+    first, second = load_policy("rough"), load_policy("teacher")
+    network, card = average_policies(first, second, 0.25)
+    a, b = first.network.state_dict(), second.network.state_dict()
+    for name, tensor in network.state_dict().items():
+        torch.testing.assert_close(tensor, 0.75 * a[name] + 0.25 * b[name])
+    assert [(part["policy"], part["share"]) for part in card.training["averaged"]] == [
+        ("rough", 0.75),
+        ("teacher", 0.25),
+    ]
+    assert card.evaluation == {} and second.card.evaluation
+    save_policy(tmp_path / "mean", network, card)
+    assert load_policy(tmp_path / "mean").card.training["averaged"] == card.training["averaged"]
+
+
+def test_neither_policy_is_changed() -> None:
+    first, second = load_policy("rough"), load_policy("teacher")
+    before = {name: tensor.clone() for name, tensor in second.network.state_dict().items()}
+    average_policies(first, second, 0.5)
+    assert all(torch.equal(tensor, before[name]) for name, tensor in second.network.state_dict().items())
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.5, float("nan")])
+def test_a_share_is_a_share(share: float) -> None:
+    with pytest.raises(InputError, match="between 0 and 1"):
+        average_policies(load_policy("rough"), load_policy("teacher"), share)
+
+
+def test_what_differs_in_more_than_weights_has_no_mean() -> None:
+    first, second = load_policy("rough"), load_policy("loco")
+    with pytest.raises(InputError, match="differ in"):
+        average_policies(first, second, 0.5)
+    other = load_policy("teacher")
+    other.card = replace(other.card, action=other.card.action | {"kp": 1.0})
+    with pytest.raises(InputError, match="differ in action"):
+        average_policies(first, other, 0.5)
