@@ -1,6 +1,7 @@
 """What is kept of an evaluation that was interrupted, and what is refused."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -117,6 +118,17 @@ def test_same_name_other_weights_is_refused(
     other = LocomotionPolicy(standing.network, trotting.card)
     with pytest.raises(InputError, match=r"policies.locomotion.weights_sha256"):
         run(two_rooms, other, folder)
+
+
+def test_new_figures_on_a_card_do_not_stop_a_run(
+    folder: Path, two_rooms: FloorPlan, trotting: LocomotionPolicy
+) -> None:
+    card = replace(trotting.card, evaluation={"loco": {"falls": 0.0}})
+    size = (folder / EPISODES).stat().st_size
+    run(two_rooms, LocomotionPolicy(trotting.network, card), folder)
+    assert (folder / EPISODES).stat().st_size == size
+    with pytest.raises(InputError, match="another evaluation"):
+        run(two_rooms, LocomotionPolicy(trotting.network, replace(card, samples=card.samples + 1)), folder)
 
 
 def test_a_broken_line_is_named(folder: Path, two_rooms: FloorPlan, trotting: LocomotionPolicy) -> None:

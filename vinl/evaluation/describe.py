@@ -22,9 +22,13 @@ _PACKAGES = ("vinl", "mujoco", "numpy", "scipy", "scikit-image", "torch", "warp-
 
 
 def describe_policy(policy: Policy) -> dict[str, Any]:
-    """Which policy it was: the digests tell two cards, and two trainings, of the same name apart."""
+    """Which policy it was: the digests tell two cards, and two trainings, of the same name apart.
+
+    What was measured of a policy is no part of it: a run goes on when its card got new figures meanwhile.
+    """
     card = policy.card
-    digest = hashlib.sha256(json.dumps(asdict(card), sort_keys=True).encode()).hexdigest()
+    itself = {name: value for name, value in asdict(card).items() if name != "evaluation"}
+    digest = hashlib.sha256(json.dumps(itself, sort_keys=True).encode()).hexdigest()
     known = {
         "name": card.name,
         "kind": card.kind,
