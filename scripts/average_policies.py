@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from vinl.config.errors import InputError
 from vinl.policies.average import average_policies
 from vinl.policies.io import load_policy, save_policy
 
@@ -22,8 +23,11 @@ def main() -> None:
     parser.add_argument("--share", type=float, default=0.5, help="of the second, 0 to 1 (default 0.5)")
     parser.add_argument("--out", type=Path, required=True, help="folder to write")
     options = parser.parse_args()
-    network, card = average_policies(load_policy(options.first), load_policy(options.second), options.share)
-    print(save_policy(options.out, network, card))
+    try:
+        network, card = average_policies(load_policy(options.first), load_policy(options.second), options.share)
+        print(save_policy(options.out, network, card))
+    except InputError as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,9 @@
 """The mean of two policies."""
 
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import torch
@@ -46,3 +49,17 @@ def test_what_differs_in_more_than_weights_has_no_mean() -> None:
     other.card = replace(other.card, action=other.card.action | {"kp": 1.0})
     with pytest.raises(InputError, match="differ in action"):
         average_policies(first, other, 0.5)
+
+
+def test_the_script_writes_a_policy_and_refuses_in_one_line(tmp_path: Path) -> None:
+    script = Path(__file__).resolve().parents[2] / "scripts" / "average_policies.py"
+
+    def run(*argv: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, str(script), *argv], capture_output=True, text=True)
+
+    assert run("rough", "teacher", "--out", str(tmp_path / "mean")).returncode == 0
+    assert load_policy(tmp_path / "mean").card.training["averaged"][1]["share"] == 0.5
+    for argv in (("rough", "loco"), ("rough", "teachr"), ("rough", "teacher", "--share", "2")):
+        refused = run(*argv, "--out", str(tmp_path / "none"))
+        assert refused.returncode == 2 and "error:" in refused.stderr and "Traceback" not in refused.stderr
+    assert not (tmp_path / "none").exists()
