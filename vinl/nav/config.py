@@ -127,6 +127,7 @@ class RewardConfig:
         progress: for each metre that the geodesic distance shrinks.
         slack: every step.
         collision: every step that is cancelled because the robot would touch something.
+        block: every step that ends above a block, which the legs then have to step over (``clutter``).
         scale: multiplies the sum.
     """
 
@@ -134,6 +135,7 @@ class RewardConfig:
     progress: float = 1.0
     slack: float = -0.002
     collision: float = -0.003
+    block: float = 0.0
     scale: float = 1.0
 
     def __post_init__(self) -> None:

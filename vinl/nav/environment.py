@@ -142,7 +142,8 @@ class NavEnvironment:
         """Means over the episodes that ended since the last call (``success``, ``spl``, ``soft_spl``, ``collisions``,
         ``steps``, ``path`` and ``start_distance``, ``end_distance`` [m], shares that were ``stuck``, ``looping``,
         ``out_of_time``; absent if none ended), their number ``episodes``; over all steps ``reward``, the share
-        ``blocked`` and ``step_length`` [m]; and how many were ``evicted`` because their home was replaced, or
+        ``blocked``, ``step_length`` [m] and, where ``reward.block`` counts, the share ``above_blocks``; and how many
+        were ``evicted`` because their home was replaced, or
         ``unplaced``: started off the range of distances, because no start within it was found. The host waits here."""
         return self._measures.read(self.state["unplaced"])
 
@@ -201,7 +202,14 @@ class NavEnvironment:
         timeout = ((state["steps"] >= episodes.steps) & ~success) | evicted
         done = success | timeout
         reward = rules.progress * (before - state["distance"]) + rules.success * success
-        reward = torch.where(evicted, 0.0, rules.scale * (reward + rules.slack + rules.collision * self._blocked))
+        reward += rules.slack + rules.collision * self._blocked
+        above = None
+        if rules.block != 0.0 and self.homes.blocks.most > 0:
+            above = self.homes.blocks.find_above(
+                state["home"], state["position"], state["yaw"], self.config.robot.length
+            ).float()
+            reward += rules.block * above
+        reward = torch.where(evicted, 0.0, rules.scale * reward)
         self.ended = end_episodes(
             done & ~evicted,
             state["home"],
@@ -214,7 +222,7 @@ class NavEnvironment:
             state["distance"],
             episodes.success_radius,
         )
-        self._measures.add(self.ended, reward, self._blocked, self._moved, evicted)
+        self._measures.add(self.ended, reward, self._blocked, self._moved, evicted, above)
         self._observation = None
         return reward, done, timeout
 

@@ -11,8 +11,12 @@ import warp as wp
 from jaxtyping import Int
 
 from vinl.config.errors import InputError
+from vinl.nav.block_contact import BlockTable
 from vinl.nav.grids import Homes
 from vinl.nav.home_builder import BuiltHome
+
+_SPARE_BLOCKS = 1.2
+"""Room for homes that come later and have more blocks than any at the start."""
 
 _KEPT = 64
 """Meshes of homes gone that are kept a while: launches that read them may not have run yet."""
@@ -28,6 +32,7 @@ class HomeMemory:
 
     Attributes:
         homes: the grids, for the kernels.
+        blocks: the clutter.
         capacity: (slots,) cells of the distance fields that a slot has room for.
         device: torch device.
 
@@ -62,11 +67,13 @@ class HomeMemory:
         self.homes = Homes()
         for name, tensor in self._tensors.items():
             setattr(self.homes, name, wp.from_torch(tensor, dtype=vectors.get(name)))
+        self.blocks = BlockTable(int(_SPARE_BLOCKS * max(len(home.blocks) for home in built)), slots, self.device)
         for slot, home in enumerate(built):
             self._write(slot, home)
 
     def replace(self, slot: int, home: BuiltHome) -> None:
-        """Put a home of no more cells than ``capacity`` in the place of another; the slot's generation grows by one."""
+        """Put a home of no more cells than ``capacity``, and no more blocks than ``blocks.most``, in the place of
+        another; the slot's generation grows by one."""
         self._gone.append(self._mesh[slot])
         self._mesh[slot] = self._build_mesh(home)
         self._tensors["meshes"][slot] = self._mesh[slot].id
@@ -79,9 +86,8 @@ class HomeMemory:
 
     def count_bytes(self) -> int:
         """Device memory of all homes but their meshes' ray trees [bytes]."""
-        return sum(t.numel() * t.element_size() for t in self._tensors.values()) + sum(
-            mesh.points.capacity + mesh.indices.capacity for mesh in self._mesh
-        )
+        grids = sum(t.numel() * t.element_size() for t in self._tensors.values())
+        return grids + self.blocks.bytes + sum(m.points.capacity + m.indices.capacity for m in self._mesh)
 
     def _build_mesh(self, home: BuiltHome) -> wp.Mesh:
         stream = None
@@ -102,6 +108,7 @@ class HomeMemory:
         self._copy(tensors["starts"][slot], home.starts)
         self._copy(tensors["shape"][slot], np.array(home.fields.shape[:2], np.int32))
         self._copy(tensors["origin"][slot], np.array(home.origin, np.float32))
+        self._copy(self.blocks.rows(slot), self.blocks.encode(home.blocks))
 
     def _copy(self, target: torch.Tensor, values: np.ndarray) -> None:
         source = torch.from_numpy(values)

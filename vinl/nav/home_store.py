@@ -56,6 +56,7 @@ class HomeStore:
     Attributes:
         records: of the home in every slot.
         homes: the grids on the device, for the kernels.
+        blocks: the clutter on the device.
         device: torch device.
         dropped: homes without a path so far; they are never used.
         reasons: why those were dropped that were there when the store was built.
@@ -72,7 +73,7 @@ class HomeStore:
         if not built:
             raise InputError("the navigation environment needs at least one home")
         self._memory = HomeMemory(built, check_device(device), tree)
-        self.device, self.homes = self._memory.device, self._memory.homes
+        self.device, self.homes, self.blocks = self._memory.device, self._memory.homes, self._memory.blocks
         self.records = [_record(home) for home in built]
         self.dropped, self.replaced, self.skipped = dropped, 0, 0
         self.reasons: list[str] = []
@@ -245,6 +246,7 @@ class HomeStore:
         """
         capacity = self._memory.capacity
         fitting = (capacity >= home.cells) & (capacity <= _SPARE_ROOM * home.cells)
+        fitting &= len(home.blocks) <= self.blocks.most
         if not fitting.any():
             self.skipped += 1
             return False

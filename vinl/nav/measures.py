@@ -109,7 +109,8 @@ class Measures:
 
     def __init__(self, device: torch.device) -> None:
         self._ended = torch.zeros(len(_NAMES), dtype=torch.float64, device=device)
-        self._steps = torch.zeros(5, dtype=torch.float64, device=device)
+        self._steps = torch.zeros(6, dtype=torch.float64, device=device)
+        self._sees_blocks = False
 
     def add(
         self,
@@ -118,11 +119,14 @@ class Measures:
         blocked: Float[Tensor, " n"],
         moved: Float[Tensor, " n"],
         evicted: Bool[Tensor, " n"],
+        above: Float[Tensor, " n"] | None,
     ) -> None:
-        """Count a step of all robots."""
+        """Count a step of all robots; ``above`` is 1 for those above a block, None where nobody looks."""
+        self._sees_blocks |= above is not None
+        above = torch.zeros_like(reward) if above is None else above
         rows = torch.stack([end.counted.float(), *(getattr(end, name) for name in _NAMES[1:])])
         self._ended += torch.where(end.counted, rows, 0.0).sum(1, dtype=torch.float64)
-        step = torch.stack([torch.ones_like(reward), reward, blocked, moved, evicted.float()])
+        step = torch.stack([torch.ones_like(reward), reward, blocked, moved, above, evicted.float()])
         self._steps += step.sum(1, dtype=torch.float64)
 
     def read(self, unplaced: Tensor) -> dict[str, float]:
@@ -134,15 +138,17 @@ class Measures:
         values = torch.cat([self._ended, self._steps, unplaced.sum(dtype=torch.float64)[None]]).tolist()
         for sums in (self._ended, self._steps, unplaced):
             sums.zero_()
-        ended, steps = dict(zip(_NAMES, values[: len(_NAMES)], strict=True)), max(values[-6], 1.0)
+        ended, steps = dict(zip(_NAMES, values[: len(_NAMES)], strict=True)), max(values[-7], 1.0)
         episodes = ended.pop("episodes")
         measures = {"episodes": episodes}
         if episodes > 0:
             measures |= {name: value / episodes for name, value in ended.items()}
+        if self._sees_blocks:
+            measures["above_blocks"] = values[-3] / steps
         return measures | {
-            "reward": values[-5] / steps,
-            "blocked": values[-4] / steps,
-            "step_length": values[-3] / steps,
+            "reward": values[-6] / steps,
+            "blocked": values[-5] / steps,
+            "step_length": values[-4] / steps,
             "evicted": values[-2],
             "unplaced": values[-1],
         }
