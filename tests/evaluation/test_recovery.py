@@ -24,31 +24,50 @@ def test_a_robot_that_moves_or_turns_is_left_alone() -> None:
     assert not freed.any() and (out == choice).all()
 
 
-def test_a_stuck_robot_turns_away_then_walks_and_longer_to_the_other_side_next_time() -> None:
-    poses = np.tile([[1.0, 2.0, 3.1]], (60, 1, 1))
+def phases(out: np.ndarray, freed: np.ndarray) -> list[tuple[str, int, float]]:
+    """What a robot was made to do: back, turn or walk, for how many decisions, and the yaw rate."""
+    found: list[tuple[str, int, float]] = []
+    for (speed, rate), is_freed in zip(out, freed, strict=True):
+        name = "own" if not is_freed else "back" if speed < 0 else "turn" if rate else "walk"
+        if found and found[-1][0] == name:
+            found[-1] = (name, found[-1][1] + 1, found[-1][2])
+        else:
+            found.append((name, 1, float(rate)))
+    return found
+
+
+def test_a_stuck_robot_backs_up_turns_away_and_walks_and_longer_to_the_other_side_next_time() -> None:
+    poses = np.tile([[1.0, 2.0, 3.1]], (80, 1, 1))
     poses[::2, 0, 2] = -3.1  # yaw wraps: that is no turn
     choice = np.array([[0.6, 0.2]])
     out, freed = drive(Recovery(1, SPEED, RATE), poses, choice)
-    assert not freed[:6].any() and freed[6, 0]
-    first = np.flatnonzero(freed[:, 0])[:4]
-    np.testing.assert_array_equal(first, [6, 7, 8, 9])
-    np.testing.assert_array_equal(out[first, 0], [[0, -RATE], [0, -RATE], [SPEED, 0], [SPEED, 0]])
-    then = np.flatnonzero(freed[:, 0] & (np.arange(60) > 9))[:6]
-    assert then[0] == 16  # six decisions of its own between two tries
-    np.testing.assert_array_equal(out[then, 0], [[0, RATE]] * 4 + [[SPEED, 0]] * 2)
-    assert (out[~freed[:, 0]] == choice).all()
+    done = phases(out[:, 0], freed[:, 0])
+    assert done[:4] == [("own", 6, 0.2), ("back", 2, 0.0), ("turn", 2, -RATE), ("walk", 2, 0.0)]
+    # six decisions of its own between two tries
+    assert done[4:8] == [("own", 6, 0.2), ("back", 4, 0.0), ("turn", 4, RATE), ("walk", 4, 0.0)]
+    assert done[8:12] == [("own", 6, 0.2), ("back", 6, 0.0), ("turn", 6, -RATE), ("walk", 6, 0.0)]
+    assert (out[~freed[:, 0]] == choice).all() and set(out[freed[:, 0], 0, 0]) == {-0.3, 0.0, SPEED}
 
 
-def test_one_that_came_away_starts_anew_and_robots_do_not_share_their_past() -> None:
+def test_one_that_is_stuck_elsewhere_starts_anew_and_robots_do_not_share_their_past() -> None:
     choice = np.array([[0.6, -0.2], [0.6, -0.2]])
-    poses = np.zeros((40, 2, 3))
-    poses[:, 1, 0] = np.arange(40) * 0.3  # never stuck
+    poses = np.zeros((60, 2, 3))
+    poses[:, 1, 0] = np.arange(60) * 0.3  # never stuck
     poses[12:20, 0, 0] = np.linspace(0.3, 2.0, 8)  # comes free after the first try
     poses[20:, 0, 0] = 2.0
     out, freed = drive(Recovery(2, SPEED, RATE), poses, choice)
     assert not freed[:, 1].any()
-    again = np.flatnonzero(freed[:, 0])
-    assert (np.diff(again) > 1).sum() >= 1
-    second = again[np.flatnonzero(np.diff(again) > 1)[0] + 1]
-    # the first try of another place: away from where it wants to turn, for two decisions
-    np.testing.assert_array_equal(out[second : second + 3, 0], [[0, RATE], [0, RATE], [SPEED, 0]])
+    done = [phase for phase in phases(out[:, 0], freed[:, 0]) if phase[0] != "own"]
+    assert done[:3] == done[3:6] == [("back", 2, 0.0), ("turn", 2, RATE), ("walk", 2, 0.0)]
+
+
+def test_one_that_comes_back_to_where_it_was_stuck_is_taken_away_for_longer() -> None:
+    poses = np.zeros((60, 1, 3))
+    poses[12:20, 0, 0] = [0.5, 1.0, 1.5, 2.0, 2.0, 1.5, 1.0, 0.5]
+    out, freed = drive(Recovery(1, SPEED, RATE), poses, np.array([[0.6, -0.2]]))
+    done = [phase for phase in phases(out[:, 0], freed[:, 0]) if phase[0] != "own"]
+    assert done[:6] == [
+        (name, n, rate)
+        for n, side in ((2, RATE), (4, -RATE))
+        for name, rate in (("back", 0.0), ("turn", side), ("walk", 0.0))
+    ]

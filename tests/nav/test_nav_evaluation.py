@@ -3,6 +3,7 @@
 import gzip
 import json
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,6 +74,17 @@ def test_the_camera_is_the_policys_and_its_motion_the_rules(untrained):
     assert (config.camera.width, config.camera.height, config.camera.mount_height) == (32, 24, 0.3)
     assert config.motion.uniform > 0.5 and config.episodes.steps == 250 and config.episodes.distance == (5.0, 30.0)
     assert describe_episodes(None, NavEvaluation()).camera is None
+
+
+def test_it_drives_at_the_speeds_of_the_policys_card(untrained):
+    slow = build_config(NavConfig, {**TINY, "robot": {"max_speed": 0.6, "max_yaw_rate": 0.8}})
+    card = make_card("slow", slow, 7, "abc")
+    assert (card.action["forward_speed"], card.action["yaw_rate"]) == ([0.0, 0.6], [-0.8, 0.8])
+    robot = describe_episodes(card, NavEvaluation()).robot
+    assert (robot.max_speed, robot.max_yaw_rate) == (0.6, 0.8)
+    backwards = replace(card, action={"forward_speed": [-0.3, 0.6]})
+    with pytest.raises(InputError, match="drives from 0 m/s up"):
+        describe_episodes(backwards, NavEvaluation())
 
 
 def record(success: bool, spl: float, geodesic: float = 6.0) -> NavRecord:

@@ -1,4 +1,4 @@
-"""What frees a robot that does not come on: it may not walk backwards, so it turns away, then goes ahead."""
+"""What frees a robot that does not come on: it backs up, turns away, then goes ahead."""
 
 from __future__ import annotations
 
@@ -8,19 +8,24 @@ from jaxtyping import Bool, Float
 _STILL, _STILL_M, _STILL_RAD = 6, 0.12, 0.2
 """A robot that in so many decisions (3 s) moved [m] and turned [rad] less than this is stuck."""
 
-_TURN, _LONGEST, _WALK = 2, 8, 2
-"""Decisions that it turns at the first try (1 s; at the next to the other side, and so much longer), at most, and that
-it then walks straight ahead."""
+_PART, _LONGEST = 2, 8
+"""Decisions that it walks back, turns, and walks ahead at the first try (1 s each), so much longer at each further one,
+and at most."""
+
+_BACK_SPEED = -0.3
+"""Forward speed of a robot that walks back [m/s]. No navigator asks for it, but every locomotor descends from one that
+was trained to (``configs/loco/rough.yaml``); faster than that they were never tried."""
 
 _AWAY_M = 1.0
-"""A robot that has come so far from where it was stuck starts anew with the first try [m]."""
+"""A robot that is stuck so far from where it was stuck last starts anew with the first try [m]."""
 
 
 class Recovery:
     """Watches n robots and overrules the choice for those that are stuck.
 
     A robot sees what is ahead of it, and what holds it, a leg behind the arm of a sofa, is not there. It is told the
-    same for ever, for nothing that it sees changes. To do something else is all that helps.
+    same for ever, for nothing that it sees changes. To do something else is all that helps, and where it came from
+    there was room for it.
 
     Args:
         n: robots.
@@ -31,7 +36,7 @@ class Recovery:
     def __init__(self, n: int, speed: float, turn_rate: float) -> None:
         self._speed, self._rate = speed, turn_rate
         self._past: list[np.ndarray] = []
-        self._turns, self._walks = np.zeros(n, int), np.zeros(n, int)  # decisions left of each
+        self._backs, self._turns, self._walks = np.zeros((3, n), int)  # decisions left of each
         self._calm = np.zeros(n, int)  # decisions until it may be called stuck again
         self._tries, self._side = np.zeros(n, int), np.ones(n)
         self._where = np.full((n, 2), np.inf)
@@ -49,25 +54,27 @@ class Recovery:
             The choice, for robots that are being freed another one, and who these are.
         """
         self._past = [*self._past, pose.copy()][-_STILL - 1 :]
-        far = np.linalg.norm(pose[:, :2] - self._where, axis=1) > _AWAY_M
-        self._tries[far] = 0
         stuck = self._are_still(pose) & (self._calm == 0)
-        again = stuck & (self._tries > 0)
+        again = stuck & (np.linalg.norm(pose[:, :2] - self._where, axis=1) < _AWAY_M)
         self._side = np.where(again, -self._side, np.where(stuck, np.where(choice[:, 1] > 0, -1.0, 1.0), self._side))
         self._where[stuck & ~again] = pose[stuck & ~again, :2]
-        self._tries[stuck] += 1
-        self._turns[stuck] = np.minimum(_TURN * self._tries[stuck], _LONGEST)
-        self._walks[stuck] = _WALK
-        turns = self._turns > 0
-        walks = ~turns & (self._walks > 0)
+        self._tries[stuck] = np.where(again, self._tries + 1, 1)[stuck]
+        for part in (self._backs, self._turns, self._walks):
+            part[stuck] = np.minimum(_PART * self._tries[stuck], _LONGEST)
+        backs = self._backs > 0
+        turns = ~backs & (self._turns > 0)
+        walks = ~backs & ~turns & (self._walks > 0)
+        freed = backs | turns | walks
         choice = choice.copy()
+        choice[backs] = _BACK_SPEED, 0.0
         choice[turns] = np.stack([np.zeros(len(pose)), self._side * self._rate], 1)[turns]
         choice[walks] = self._speed, 0.0
+        self._backs[backs] -= 1
         self._turns[turns] -= 1
         self._walks[walks] -= 1
         # the decisions of the recovery itself say nothing on whether it helped
-        self._calm = np.where(turns | walks, _STILL, np.maximum(self._calm - 1, 0))
-        return choice, turns | walks
+        self._calm = np.where(freed, _STILL, np.maximum(self._calm - 1, 0))
+        return choice, freed
 
     def _are_still(self, pose: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
         if len(self._past) <= _STILL:

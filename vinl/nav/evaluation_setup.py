@@ -17,6 +17,7 @@ from vinl.nav.robot_config import CameraConfig
 from vinl.policies.card import PolicyCard, find_previous
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
+from vinl.policies.velocity_range import VelocityRange
 from vinl.world.readers import expand_paths, shipped_floorplans
 
 MOTIONS = {
@@ -97,12 +98,15 @@ def name_kind(path: str) -> str:
 
 
 def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfig:
-    """The environment of an evaluation: the policy's camera and memory of its last step, the motion and execution of
-    ``rules.motion``. The walking robot carries the camera as high as it walks, whatever the training took.
+    """The environment of an evaluation: the policy's camera, velocities and memory of its last step, the motion and
+    execution of ``rules.motion``. The walking robot carries the camera as high as it walks, whatever the training took.
 
     Args:
         card: of the navigator; None: blind (the oracle).
         rules: of the evaluation.
+
+    Raises:
+        InputError: the card's velocities are none that the environment knows.
     """
     config = load_config(NavConfig, MOTIONS[rules.motion])
     camera = None
@@ -126,8 +130,18 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
         plans=(),
         plans_share=0.0,
     )
+    robot = config.robot
+    if card is not None:
+        span = VelocityRange.of(card)
+        if span.forward_speed[0] != 0 or span.yaw_rate[0] != -span.yaw_rate[1]:
+            raise InputError(
+                f"{card.name}: its card has forward_speed {list(span.forward_speed)}, yaw_rate {list(span.yaw_rate)}; "
+                "the kinematic environment drives from 0 m/s up and turns to both sides alike"
+            )
+        robot = replace(robot, max_speed=span.forward_speed[1], max_yaw_rate=span.yaw_rate[1])
     return replace(
         config,
+        robot=robot,
         num_envs=rules.episodes,
         seed=rules.seed,
         previous="action" if card is None else find_previous(card),

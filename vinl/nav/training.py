@@ -33,6 +33,10 @@ from vinl.rl.run_folder import RunFolder
 _SEEDS_BETWEEN = 10_000_000
 """Each process has homes of its own: their seeds lie this far apart."""
 
+_HOST_THREADS = 4
+"""Threads of torch on the host beside a GPU. On 64 cores a training with as many threads used 15 cores while it copied
+homes to the GPU, and several at once brought the machine to a stand."""
+
 _WAY_SIZE = 2
 """Numbers that tell where the shortest way leads."""
 
@@ -86,6 +90,7 @@ def train_navigator(
     if resume:
         origin = run.read_origin()
     if device.startswith("cuda"):
+        torch.set_num_threads(min(torch.get_num_threads(), _HOST_THREADS))
         torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = torch.backends.cudnn.benchmark = True
     torch.manual_seed(config.seed + peers.rank)
     own = separate(config, peers.rank, peers.count)
@@ -265,6 +270,8 @@ def make_card(
         network,
         camera,
         config.previous,
+        config.robot.max_speed,
+        config.robot.max_yaw_rate,
         training=training,
         seed=config.seed,
         samples=samples,

@@ -125,11 +125,18 @@ def find_previous(card: PolicyCard) -> str:
 
 
 def navigation_card(
-    name: str, network: dict[str, Any], camera: dict[str, Any] | None, previous: str = "action", **rest: Any
+    name: str,
+    network: dict[str, Any],
+    camera: dict[str, Any] | None,
+    previous: str = "action",
+    max_speed: float = FORWARD_SPEED[1],
+    max_yaw_rate: float = YAW_RATE[1],
+    **rest: Any,
 ) -> PolicyCard:
     """A navigation card with the table and the action scaling that ``NavActor`` has; ``previous`` as for
-    ``navigation_table``, ``rest`` are further fields."""
-    action = {"forward_speed": list(FORWARD_SPEED), "yaw_rate": list(YAW_RATE)}
+    ``navigation_table``, ``max_speed`` [m/s] and ``max_yaw_rate`` [rad/s] as in training, ``rest`` are further
+    fields."""
+    action = {"forward_speed": [0.0, max_speed], "yaw_rate": [-max_yaw_rate, max_yaw_rate]}
     return PolicyCard("navigation", name, network, navigation_table(previous), action, camera, **rest)
 
 
