@@ -44,7 +44,8 @@ class Navigator(Protocol):
         ...
 
     def act(self, observation: dict[str, Any]) -> Float[np.ndarray, "n 2"]:
-        """Forward speed in [0, 1] m/s and yaw rate in [-pi/3, pi/3] rad/s of every robot.
+        """Forward speed in [0, 1] m/s and yaw rate in [-pi/3, pi/3] rad/s of every robot. A negative speed walks back:
+        to -0.3 m/s that was tried.
 
         Args:
             observation: ``goal`` (n, 3): straight distance [m], cosine and sine of the bearing in the robot's heading
