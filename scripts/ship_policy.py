@@ -45,6 +45,8 @@ def main() -> None:
     parser.add_argument("--commit", help="commit of the code that trained it, when the card does not know")
     options = parser.parse_args()
     policy = load_policy(options.run)
+    if options.max_speed is not None and options.max_speed <= 0:
+        parser.error(f"--max-speed must be positive, got {options.max_speed:g}")
     if options.max_speed is not None and policy.card.kind != "navigation":
         parser.error(f"{options.run}: --max-speed is for navigators, this is a {policy.card.kind} policy")
     card = clean(policy.card, options.name, options.start, options.commit, options.max_speed)
