@@ -52,6 +52,18 @@ def test_above_a_block_is_what_exact_geometry_says() -> None:
     np.testing.assert_array_equal(found[sure], np.array(expected)[sure])
 
 
+def test_a_home_with_more_blocks_than_there_was_room_for() -> None:
+    block = np.array([[0.0, 0.0, 0.3, 0.4, 0.2, 0.15]])
+    table, pose = BlockTable(0, 2, torch.device("cpu")), torch.zeros(2, 3)
+    assert not table.find_above(torch.arange(2), pose[:, :2], pose[:, 2], 0.65).any()
+    for slot, rows in ((0, block), (1, np.concatenate([block + np.eye(6)[0] * 9, block]))):
+        table.reserve(len(rows))
+        table.rows(slot).copy_(torch.from_numpy(table.encode(rows)))
+    table.rows(0).copy_(torch.from_numpy(table.encode(block + np.eye(6)[0] * 9)))
+    assert table.most == 2
+    assert table.find_above(torch.arange(2), pose[:, :2], pose[:, 2], 0.65).tolist() == [False, True]
+
+
 def test_steps_above_blocks_cost_and_are_counted(config) -> None:
     config = replace(config, num_envs=64, camera=None, clutter=ClutterConfig(share=1.0, density=(1.0, 1.0)))
     homes = HomeStore.from_plans([load_floorplan("harbour_flat")], config)

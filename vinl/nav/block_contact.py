@@ -18,18 +18,26 @@ class BlockTable:
     """The blocks of all homes in one tensor, as many rows for each home as the one with the most blocks needs.
 
     Args:
-        most: blocks of one home at most.
+        most: blocks of one home at most; ``reserve`` makes room for more.
         slots: homes.
         device: torch device.
-
-    Attributes:
-        most: as given.
     """
 
     def __init__(self, most: int, slots: int, device: torch.device) -> None:
-        self.most = most
         self._rows = torch.zeros(slots, most, 6, device=device)  # x, y, cos and sin of the yaw, half length, half width
         self._rows[..., 0] = _FAR
+
+    @property
+    def most(self) -> int:
+        """Rows of each home."""
+        return self._rows.shape[1]
+
+    def reserve(self, most: int) -> None:
+        """Make room for homes of so many blocks, if there is none yet."""
+        if most > self.most:
+            more = torch.zeros(len(self._rows), most - self.most, 6, device=self._rows.device)
+            more[..., 0] = _FAR
+            self._rows = torch.cat([self._rows, more], 1)
 
     @property
     def bytes(self) -> int:

@@ -15,9 +15,6 @@ from vinl.nav.block_contact import BlockTable
 from vinl.nav.grids import Homes
 from vinl.nav.home_builder import BuiltHome
 
-_SPARE_BLOCKS = 1.2
-"""Room for homes that come later and have more blocks than any at the start."""
-
 _KEPT = 64
 """Meshes of homes gone that are kept a while: launches that read them may not have run yet."""
 
@@ -67,13 +64,12 @@ class HomeMemory:
         self.homes = Homes()
         for name, tensor in self._tensors.items():
             setattr(self.homes, name, wp.from_torch(tensor, dtype=vectors.get(name)))
-        self.blocks = BlockTable(int(_SPARE_BLOCKS * max(len(home.blocks) for home in built)), slots, self.device)
+        self.blocks = BlockTable(max(len(home.blocks) for home in built), slots, self.device)
         for slot, home in enumerate(built):
             self._write(slot, home)
 
     def replace(self, slot: int, home: BuiltHome) -> None:
-        """Put a home of no more cells than ``capacity``, and no more blocks than ``blocks.most``, in the place of
-        another; the slot's generation grows by one."""
+        """Put a home of no more cells than ``capacity`` in the place of another; the slot's generation grows by one."""
         self._gone.append(self._mesh[slot])
         self._mesh[slot] = self._build_mesh(home)
         self._tensors["meshes"][slot] = self._mesh[slot].id
@@ -108,6 +104,7 @@ class HomeMemory:
         self._copy(tensors["starts"][slot], home.starts)
         self._copy(tensors["shape"][slot], np.array(home.fields.shape[:2], np.int32))
         self._copy(tensors["origin"][slot], np.array(home.origin, np.float32))
+        self.blocks.reserve(len(home.blocks))
         self._copy(self.blocks.rows(slot), self.blocks.encode(home.blocks))
 
     def _copy(self, target: torch.Tensor, values: np.ndarray) -> None:

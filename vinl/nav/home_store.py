@@ -246,7 +246,6 @@ class HomeStore:
         """
         capacity = self._memory.capacity
         fitting = (capacity >= home.cells) & (capacity <= _SPARE_ROOM * home.cells)
-        fitting &= len(home.blocks) <= self.blocks.most
         if not fitting.any():
             self.skipped += 1
             return False
