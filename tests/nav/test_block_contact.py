@@ -10,10 +10,11 @@ import torch
 from shapely import affinity
 from shapely.geometry import box
 
-from vinl.nav.block_contact import WIDTH, BlockTable
+from vinl.nav.block_contact import BlockTable
 from vinl.nav.config import ClutterConfig, RewardConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.home_store import HomeStore
+from vinl.robot.aliengo import WIDTH
 from vinl.world.readers import load_floorplan
 
 

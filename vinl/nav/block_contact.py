@@ -7,8 +7,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-WIDTH = 0.38
-"""Of the robot over its feet [m]; the rectangle that meets walls is the trunk's."""
+from vinl.robot.aliengo import WIDTH
 
 _FAR = 1e6
 """Where blocks lie that are none [m]."""
@@ -59,7 +58,8 @@ class BlockTable:
     def find_above(
         self, home: Int[Tensor, " n"], position: Float[Tensor, "n 2"], yaw: Float[Tensor, " n"], length: float
     ) -> Bool[Tensor, " n"]:
-        """Which robots' rectangles, ``length`` x ``WIDTH``, overlap a block: exact, by separating axes."""
+        """Which robots overlap a block, as rectangles of ``length`` x ``WIDTH``: as wide as over the feet, not as the
+        trunk, which is what meets walls. Exact, by separating axes."""
         x, y, cos, sin, half_length, half_width = self._rows[home.long()].unbind(-1)
         x, y = x - position[:, :1], y - position[:, 1:]
         own_cos, own_sin = yaw.cos()[:, None], yaw.sin()[:, None]
