@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from vinl.loco.environment import LocoEnvironment
-from vinl.loco.simulation import Body, Simulation
+from vinl.loco.rewards import Motion, reward_terms
+from vinl.loco.simulation import Body, Contacts, Simulation
 from vinl.robot.aliengo import DEFAULT_POSE, home_qpos
 from vinl.robot.observation import NOISE, SCAN_POINTS, observe
 from vinl.sensing.height_scan import scan_ground
@@ -125,6 +126,21 @@ def test_contacts_tell_blocks_from_walls_from_ground(small_config):
     assert not foot[3].any() and not shank_block.any()
     others = [0, 1, 3]  # the third robot's trunk stands in the wall too
     assert not shank[others].any() and not trunk[others].any() and not down[others].any()
+
+
+def test_a_foot_near_a_block_costs_by_how_near_it_is(env):
+    motion = Motion(*(jnp.zeros((2, 3)) for _ in Motion._fields))
+    contacts = Contacts(*(jnp.zeros((2, 4), bool) for _ in Contacts._fields))
+    gap = jnp.array([[0.25, 0.05, 0.025, -0.01], [0.25, 0.25, 0.25, 0.06]])
+    action = jnp.zeros((2, 12))
+    motion = motion._replace(
+        contacts=contacts._replace(foot_gap=gap, trunk=jnp.zeros(2, bool)),
+        fallen=jnp.zeros(2),
+        **dict.fromkeys(("joints", "joint_speed", "last_joint_speed", "torque", "action", "last_action"), action),
+        **dict.fromkeys(("air_time", "landed"), jnp.zeros((2, 4))),
+    )
+    terms = reward_terms(motion, 0.25)
+    np.testing.assert_allclose(terms["near_block"], [0.5 + 1, 0], atol=1e-6)
 
 
 def test_pushes_set_the_velocity(small_config, env):

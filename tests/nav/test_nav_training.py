@@ -116,6 +116,20 @@ def test_who_starts_from_a_run_gets_its_critic(tmp_path):
         load_critic(second, tmp_path)
 
 
+def test_a_fresh_critic_learns_before_the_actor_does(tmp_path, small):
+    start, early, later = tmp_path / "start", tmp_path / "early", tmp_path / "later"
+    assert train(small, start, "--iterations", "1") == 0
+    origin = str(start / "policy")  # a policy has no critic
+    for out, count in ((early, "2"), (later, "3")):
+        assert train(small, out, "--iterations", count, "--from", origin, "ppo.critic_warmup=2") == 0
+    given, held, moved = weights(start), weights(early), weights(later)
+    actor = [name for name in given if name.startswith("actor.") and given[name].is_floating_point()]
+    assert all(torch.equal(given[name], held[name]) for name in actor)
+    assert held["log_std"].tolist() == [-0.5, -0.5]
+    assert not torch.equal(held["value.0.weight"], given["value.0.weight"])
+    assert not any(torch.equal(moved[name], held[name]) for name in actor if name.endswith("weight"))
+
+
 def test_time_ends_a_training_and_cools_it(tmp_path, small, capsys):
     run = tmp_path / "run"
     more = ["ppo.last_log_std=-1.9", "ppo.cool_from=0", "ppo.last_rate=1e-5"]

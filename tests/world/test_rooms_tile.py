@@ -29,6 +29,20 @@ def test_the_start_is_free_and_has_a_way_out(seed: int, difficulty: float) -> No
     assert np.abs(points.reshape(*free.shape, 2)[here]).max() > 1.4  # beyond the room in the middle
 
 
+def test_alleys_are_narrow_and_the_start_stays_free() -> None:
+    def spaces(alleys: float) -> np.ndarray:
+        walls = [draw_rooms(np.random.default_rng(k), TILE, 0.5, alleys).rows for k in range(10)]
+        cuts = [np.unique(w[np.isclose(w[:, 2], 0), 1]) for w in walls]  # where walls along x stand
+        return np.concatenate([np.diff(c) for c in cuts])
+
+    assert spaces(0.0).min() > 0.9
+    share = np.mean(spaces(0.5) < 0.8)
+    assert 0.2 < share < 0.6
+    assert spaces(0.5).min() >= 0.5
+    walls = draw_rooms(np.random.default_rng(0), TILE, 1.0, alleys=1.0)
+    assert walls.distances(np.zeros((1, 2))).min() > 0.55
+
+
 def test_walls_get_nearer() -> None:
     def room(difficulty: float) -> float:
         axis = np.linspace(-3, 3, 61)

@@ -64,6 +64,7 @@ class RewardConfig:
         air_time: seconds over 0.5 that a foot was in the air, at touch-down.
         obstacle_contact: feet that touch a block or wall.
         leg_contact: shanks that touch a block or wall (``collision`` counts them once more).
+        near_block: feet within 5 cm of a block, above or beside it: 0 there, 1 where they touch.
         orientation: squared tilt of the trunk.
         stand_still: joint angles away from the default pose while told to stand.
         fall: one fall (not multiplied by the control step).
@@ -86,6 +87,7 @@ class RewardConfig:
     air_time: float = 1.0
     obstacle_contact: float = 0.0
     leg_contact: float = 0.0
+    near_block: float = 0.0
     orientation: float = 0.0
     stand_still: float = 0.0
     velocity_error: float = 0.0

@@ -10,6 +10,10 @@ from jaxtyping import Array, Bool, Float
 from vinl.loco.simulation import Contacts
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
 
+NEAR_BLOCK = 0.05
+"""A foot nearer to a block than this costs ``near_block`` [m]: half the pitch of the height scan, so that a foot which
+keeps it clears a block whose edges the scan does not show more exactly."""
+
 
 class Motion(NamedTuple):
     """What the terms are computed from; velocities in the trunk's frame.
@@ -72,6 +76,7 @@ def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"
         "air_time": jnp.sum((m.air_time - 0.5) * m.landed, 1) * (speed > 0.1),
         "obstacle_contact": foot_hit.sum(1).astype(jnp.float32),
         "leg_contact": shank_hit.sum(1).astype(jnp.float32),
+        "near_block": jnp.sum(jnp.clip(1 - m.contacts.foot_gap / NEAR_BLOCK, 0.0, 1.0), 1),
         "orientation": jnp.sum(m.gravity[:, :2] ** 2, 1),
         "stand_still": jnp.sum(jnp.abs(m.joints - jnp.asarray(DEFAULT_POSE, jnp.float32)), 1) * told_to_stand,
         "velocity_error": error2,

@@ -16,7 +16,7 @@ from vinl.robot.aliengo import FOOT_GEOMS, SHANK_SPHERES, SUBSTEPS, TRUNK_SPHERE
 from vinl.robot.aliengo import LEGS as LEG_NAMES
 from vinl.robot.model import robot_spec
 from vinl.world.blocks import Blocks
-from vinl.world.clearance import block_distances, clearance
+from vinl.world.clearance import FAR, block_distances, clearance
 from vinl.world.heightfield import BLOCK, WALL, HeightField
 
 # TF32 would round a position of 80 m to 6 cm: matrix products in full float32.
@@ -34,7 +34,8 @@ SHANK_REACH = 0.018
 """A shank nearer than this to a block [m] touches it: the capsule's 0.0145 m and the error of the grid. Chosen so that
 the count agrees with MuJoCo C's contacts of the capsule on the same motion."""
 
-FOOT_REACH = 0.0265 + 0.02
+_FOOT_RADIUS = 0.0265
+FOOT_REACH = _FOOT_RADIUS + 0.02
 """A foot whose middle is farther than this from any block [m] does not touch one: what it touches then is the slope
 that the height field has for the block's side, up to a cell wide."""
 
@@ -75,6 +76,7 @@ class Contacts(NamedTuple):
     Attributes:
         foot, shank: (n, 4) anything; trunk: (n,) anything; trunk_down: (n,) something from above.
         foot_block, shank_block, foot_wall, shank_wall: (n, 4) a block, a wall.
+        foot_gap: (n, 4) least distance of a foot's surface from the blocks at any substep, at most ``FAR`` [m].
     """
 
     foot: Bool[Array, "n 4"]
@@ -85,6 +87,7 @@ class Contacts(NamedTuple):
     shank_block: Bool[Array, "n 4"]
     foot_wall: Bool[Array, "n 4"]
     shank_wall: Bool[Array, "n 4"]
+    foot_gap: Float[Array, "n 4"]
 
 
 class Simulation:
@@ -184,7 +187,7 @@ class Simulation:
         Returns:
             The new state, the latched contacts and the torques of the last substep [N m].
         """
-        qpos, qvel, warm, flags, torque = self._substeps(ground, *body, target, friction, added_mass)
+        qpos, qvel, warm, flags, gap, torque = self._substeps(ground, *body, target, friction, added_mass)
         n = len(qpos)
         touch, block, wall = (
             flags[:, : LEGS + TRUNK],
@@ -204,6 +207,7 @@ class Simulation:
             shank_block=by_leg(block) | flags[:, 3 * LEGS + TRUNK : -1],
             foot_wall=wall[:, :FEET],
             shank_wall=by_leg(wall),
+            foot_gap=gap,
         )
         return Body(qpos, qvel, warm), contacts, torque
 
@@ -225,7 +229,7 @@ class Simulation:
         model = self.robot_model(ground, friction, added_mass)
 
         def substep(carry, _):
-            qpos, qvel, warm, flags, _ = carry
+            qpos, qvel, warm, flags, gap, _ = carry
             data = self.physics_step(model, qpos, qvel, warm, target)
             contact = data._impl.contact
             on = contact.dist[self._contact_rows] < 0
@@ -234,23 +238,27 @@ class Simulation:
             raised = jnp.any(on[:LEGS] & ((up[:LEGS] < 0.7) | (z[:LEGS] > 0.02)), 1)
             near = ground.near[self.cell(data.geom_xpos[self._spheres[:LEGS], :2])]
             block, wall = raised & ((near & 1) > 0), raised & (near == 2)
-            feet_near, beside = self._at_blocks(ground, data)
-            block = jnp.concatenate([block[:FEET] & feet_near, block[FEET:]])
+            free, beside = self._at_blocks(ground, data)
+            if self._has_blocks:
+                block = jnp.concatenate([block[:FEET] & (free < FOOT_REACH), block[FEET:]])
             down = jnp.any(on[LEGS:] & (up[LEGS:] > 0.5))
             new = jnp.concatenate([jnp.any(on, 1), block, wall, beside, down[None]])
-            return (data.qpos, data.qvel, data.qacc_warmstart, flags | new, data.actuator_force), None
+            gap = jnp.minimum(gap, free - _FOOT_RADIUS)
+            return (data.qpos, data.qvel, data.qacc_warmstart, flags | new, gap, data.actuator_force), None
 
-        start = (qpos, qvel, warm, jnp.zeros(3 * LEGS + TRUNK + FEET + 1, bool), jnp.zeros(12))
+        flags = jnp.zeros(3 * LEGS + TRUNK + FEET + 1, bool)
+        start = (qpos, qvel, warm, flags, jnp.full(FEET, FAR), jnp.zeros(12))
         return jax.lax.scan(substep, start, None, length=SUBSTEPS)[0]
 
-    def _at_blocks(self, ground: Ground, data: mjx.Data) -> tuple[Bool[Array, "4"], Bool[Array, "4"]]:
-        """By geometry: which feet of one robot may touch a block, and which shanks do, anywhere along their length."""
+    def _at_blocks(self, ground: Ground, data: mjx.Data) -> tuple[Float[Array, "4"], Bool[Array, "4"]]:
+        """By geometry: how far the middles of one robot's feet are from the blocks [m], and which of its shanks touch
+        one, anywhere along their length."""
         if not self._has_blocks:
-            return jnp.ones(FEET, bool), jnp.zeros(FEET, bool)
+            return jnp.full(FEET, FAR), jnp.zeros(FEET, bool)
         line = data.xpos[self._calves, None] + jnp.einsum("lij,kj->lki", data.xmat[self._calves], SHANK_LINE)
         points = jnp.concatenate([data.geom_xpos[self._feet][:, None], line], 1)
         free = clearance(jnp, ground.distance, ground.top, self.frame, points)
-        return free[:, 0] < FOOT_REACH, jnp.any(free[:, 1:] < SHANK_REACH, 1)
+        return free[:, 0], jnp.any(free[:, 1:] < SHANK_REACH, 1)
 
 
 def _near(field: HeightField, label: int) -> np.ndarray:

@@ -79,6 +79,8 @@ class PpoConfig:
         log_std, log_std_range: logarithm of the actions' standard deviation at the start, and its limits.
         last_log_std: from ``cool_from`` on the upper limit moves to this: what is shipped acts without chance, and
             only training almost without chance shows it where it would get stuck; null: the limit stays.
+        critic_warmup: in so many first updates only the critic's own layer learns: one that starts afresh beside the
+            weights of a policy (``--from``) would otherwise teach them nonsense.
         image_type: how the roll-out keeps images: ``float16``, or ``uint8`` in half the memory.
         bf16: images in bfloat16 (GPU only).
         compiled: image network through ``torch.compile`` (GPU only): a minute at the start, then faster.
@@ -108,6 +110,7 @@ class PpoConfig:
     log_std: float = -0.5
     log_std_range: tuple[float, float] = (-2.0, 0.2)
     last_log_std: float | None = None
+    critic_warmup: int = 0
     image_type: str = "float16"
     bf16: bool = True
     compiled: bool = True
@@ -117,6 +120,8 @@ class PpoConfig:
     def __post_init__(self) -> None:
         if min(self.steps, self.epochs, self.minibatches) < 1:
             raise InputError("ppo: steps, epochs and minibatches must be at least 1")
+        if self.critic_warmup < 0:
+            raise InputError(f"ppo.critic_warmup must not be negative, got {self.critic_warmup}")
         if self.schedule not in SCHEDULES:
             raise InputError(f"ppo.schedule must be one of {', '.join(SCHEDULES)}, got {self.schedule!r}")
         if self.image_type not in IMAGE_TYPES:

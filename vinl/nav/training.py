@@ -115,6 +115,10 @@ def train_navigator(
         learner.settings.entropy = config.ppo.entropy_at(share)
         if config.ppo.last_log_std is not None:
             learner.model.limit_spread(config.ppo.spread_at(share))
+        done, warmup = loop.current_learning_iteration, config.ppo.critic_warmup
+        learner.let_actor_learn(done >= warmup)
+        if done == warmup > 0:  # it rose while the actor stood still
+            learner.rate.set(config.ppo.learning_rate)
         for mark in config.ppo.keep_at:
             kept = run.path / "kept" / name_samples(mark)
             if peers.leads and loop.samples >= mark and not kept.exists():

@@ -110,6 +110,10 @@ class RecurrentActorCritic(nn.Module):
             guess = feature[..., :0] if self.guess is None else self.guess(feature)
             return Outlook(actor.choose(feature), self.value(seen)[..., 0], state, guess)
 
+    def actor_parameters(self) -> list[nn.Parameter]:
+        """Those of the actor, the part shared with the critic included, and of its spread."""
+        return [*self.actor.parameters(), self.log_std]
+
     @torch.no_grad()
     def hold_spread(self) -> None:
         """Keep the actions' spread within its range. A clamp inside ``forward`` would stop its gradient for good."""

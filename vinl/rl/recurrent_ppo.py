@@ -111,6 +111,7 @@ class RecurrentPPO:
         self._kl = torch.zeros((), device=self.device)
         # on the device, so that a recorded graph sees it move
         self._entropy = torch.zeros((), device=self.device)
+        self._actor_share = torch.ones((), device=self.device)
         self._step = 0
 
     @property
@@ -122,6 +123,10 @@ class RecurrentPPO:
     def entropy_coef(self) -> float:
         """Weight of the entropy bonus."""
         return self.settings.entropy
+
+    def let_actor_learn(self, learns: bool) -> None:
+        """Whether the actor and its spread learn from the next minibatch on, or the critic's own weights alone."""
+        self._actor_share.fill_(float(learns))
 
     def act(self, observation: TensorDict) -> Tensor:
         """Sampled actions (n, a); the observation is stored."""
@@ -268,6 +273,9 @@ class RecurrentPPO:
         loss = surrogate + s.value * value_loss - self._entropy * entropy + s.guess * guess_loss
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
+        for weight in model.actor_parameters():
+            if weight.grad is not None:  # Adam leaves a weight alone whose gradient has always been zero
+                weight.grad.mul_(self._actor_share)
         self.peers.average_gradients(model.parameters())
         norm = nn.utils.clip_grad_norm_(model.parameters(), s.max_grad_norm)
         self.optimizer.step()

@@ -12,6 +12,9 @@ from vinl.world.boxes import Boxes
 _WIDE, _TIGHT = (1.6, 2.6), (1.0, 1.8)
 """Distances of the walls of an easy and of a hard tile [m]."""
 
+_ALLEY = (0.5, 0.8)
+"""Widths of alleys, walls not taken off [m]: a robot 0.38 m wide over its legs walks through most and turns in none."""
+
 _START_SIDE = (1.4, 2.0)
 """Sides of the room in the middle [m]: a robot that starts within 0.3 m of its middle can turn on the spot there."""
 
@@ -26,18 +29,19 @@ _SHORTEST = 0.1
 """Walls shorter than this are left out [m]."""
 
 
-def draw_rooms(rng: np.random.Generator, side: float, difficulty: float) -> Boxes:
+def draw_rooms(rng: np.random.Generator, side: float, difficulty: float, alleys: float = 0.0) -> Boxes:
     """Walls of a tile around the origin, one metre high.
 
     Args:
         rng: random numbers.
         side: of the tile [m].
         difficulty: from 0 to 1: how near the walls are to each other.
+        alleys: share of the spaces between walls that are alleys, whatever the difficulty: as between a bed and a wall.
 
     Returns:
         The walls: missing, with a doorway, or closed.
     """
-    xs, ys = _cut(rng, side, difficulty), _cut(rng, side, difficulty)
+    xs, ys = _cut(rng, side, difficulty, alleys), _cut(rng, side, difficulty, alleys)
     rows: list[list[float]] = []
     for turned, lines, across in ((False, ys, xs), (True, xs, ys)):
         for at in lines:
@@ -51,14 +55,18 @@ def draw_rooms(rng: np.random.Generator, side: float, difficulty: float) -> Boxe
     return Boxes(np.array(rows).reshape(-1, 7))
 
 
-def _cut(rng: np.random.Generator, side: float, difficulty: float) -> Float[np.ndarray, " k"]:
+def _cut(rng: np.random.Generator, side: float, difficulty: float, alleys: float) -> Float[np.ndarray, " k"]:
     """Where walls stand along an axis [m]: around the middle room, then on to both sides."""
     low, high = ((1 - difficulty) * w + difficulty * t for w, t in zip(_WIDE, _TIGHT, strict=True))
     half = rng.uniform(*_START_SIDE) / 2
     ends = []
     for _ in range(2):
         at = [half]
-        while (further := at[-1] + rng.uniform(low, high)) < side / 2:
+        while True:
+            alley = alleys > 0 and rng.random() < alleys
+            further = at[-1] + rng.uniform(*(_ALLEY if alley else (low, high)))
+            if further >= side / 2:
+                break
             at.append(further)
         ends.append(np.array(at))
     return np.concatenate([-ends[0][::-1], ends[1]])

@@ -47,6 +47,7 @@ class TerrainConfig:
         start_clear: half-width of the square around the start without blocks [m].
         joined: share of the blocks that touch or overlap another: end to end, at an angle or side by side.
         wall_blocks: blocks on ``walls`` and ``rooms`` tiles, as a share of those on ``blocks`` tiles.
+        alleys: share of the spaces between the walls of ``rooms`` tiles that are alleys of 0.5-0.8 m.
         row_density: rows of blocks per m2 on ``blocks`` tiles beyond the first level, the same on all of these.
         row_length: range of their lengths [m].
         first_height: range of the blocks' heights on the first level [m], from which they grow evenly to
@@ -70,6 +71,7 @@ class TerrainConfig:
     start_clear: float = 0.8
     joined: float = 0.0
     wall_blocks: float = 0.0
+    alleys: float = 0.0
     row_density: float = 0.0
     row_length: tuple[float, float] = (0.8, 2.0)
     first_height: tuple[float, float] | None = None
@@ -88,8 +90,10 @@ class TerrainConfig:
             raise InputError(f"terrain: row_length must be a rising positive range, got {self.row_length}")
         if min(self.block_density, self.tall_density, self.row_density) < 0:
             raise InputError("terrain: densities must not be negative")
-        if not (0 <= self.joined <= 1 and 0 <= self.wall_blocks <= 1 and self.start_clear >= 0):
-            raise InputError("terrain: joined and wall_blocks must lie in [0, 1], start_clear must not be negative")
+        if not all(0 <= share <= 1 for share in (self.joined, self.wall_blocks, self.alleys)):
+            raise InputError("terrain: joined, wall_blocks and alleys must lie in [0, 1]")
+        if self.start_clear < 0:
+            raise InputError("terrain: start_clear must not be negative")
 
     def shares(self) -> dict[str, float]:
         """Share of every tile type, in the order of the columns."""
@@ -232,7 +236,7 @@ def build_terrain(config: TerrainConfig) -> Terrain:
                 continue
             none = np.zeros((0, 2))
             if kind == "rooms":
-                tall.append(Boxes(draw_rooms(rng, TILE, difficulty).rows + shift))
+                tall.append(Boxes(draw_rooms(rng, TILE, difficulty, config.alleys).rows + shift))
                 if config.wall_blocks > 0:
                     blocks.append(_tile_blocks(config, rng, k, middle, none, config.wall_blocks))
             elif kind == "walls":
