@@ -41,9 +41,10 @@ def rectangles(poses, length, width):
     return shapely.polygons(Boxes(np.array(rows)).corners())
 
 
-def test_moves_on_arcs_and_is_stopped_as_exact_geometry_says(blind, homes):
+@pytest.mark.parametrize("lowest", [0.0, -0.4])
+def test_moves_on_arcs_and_is_stopped_as_exact_geometry_says(blind, homes, lowest):
     rng = np.random.default_rng(0)
-    environment = NavEnvironment(blind, homes)
+    environment = NavEnvironment(replace(blind, robot=replace(blind.robot, min_speed=lowest)), homes)
     home, xy, yaw = scatter(homes, rng)
     environment.place(torch.tensor(home), torch.zeros(N, dtype=torch.int64), torch.tensor(xy), torch.tensor(yaw))
     action = rng.uniform(-1, 1, (N, 2)).astype(np.float32)
@@ -57,7 +58,7 @@ def test_moves_on_arcs_and_is_stopped_as_exact_geometry_says(blind, homes):
     shapely.prepare(walls)
     judged = 0
     for k in range(N):
-        v, w = (action[k, 0] + 1) / 2, action[k, 1] * math.pi / 3
+        v, w = lowest + (action[k, 0] + 1) / 2 * (1 - lowest), action[k, 1] * math.pi / 3
         poses = [follow_arc(xy[k], yaw[k], v, w, t) for t in np.linspace(0.02, 0.5, 25)]
         sweeps = [rectangles(poses, 0.65 + m, 0.31 + m) for m in (-0.1, 0.1)]
         surely, maybe = (shapely.intersects(walls[home[k]], sweep).any() for sweep in sweeps)

@@ -90,13 +90,15 @@ def test_a_cancelled_step_is_seen_unless_the_paper_asks(config, homes, previous)
     assert (step.vector[step.done, 3:] == 0).all()
 
 
-def test_the_motion_seen_is_what_the_poses_say(config, homes):
+@pytest.mark.parametrize("lowest", [0.0, -0.3])
+def test_the_motion_seen_is_what_the_poses_say(config, homes, lowest):
     """The chain measures the same from the poses of the robot's trunk (``vinl.evaluation.odometry``)."""
     from vinl.evaluation.odometry import measure_twist
     from vinl.nav.robot_config import ExecutionConfig
 
     execution = ExecutionConfig(lag=0.1, speed_gain=(0.8, 1.0), yaw_noise=0.2, speed_noise=0.1, side_slip=0.1)
-    environment = NavEnvironment(replace(config, num_envs=200, camera=None, execution=execution), homes)
+    robot = replace(config.robot, min_speed=lowest)
+    environment = NavEnvironment(replace(config, num_envs=200, camera=None, execution=execution, robot=robot), homes)
 
     def poses():
         return torch.cat([environment.state["position"], environment.state["yaw"][:, None]], 1).double().numpy()
@@ -105,7 +107,9 @@ def test_the_motion_seen_is_what_the_poses_say(config, homes):
         before = poses()
         _, done, _ = environment.advance(torch.rand(200, 2) * 2 - 1)
         twist = measure_twist(before, poses(), 0.5)
-        wanted = torch.tensor(twist[:, [0, 2]] * [2, 3 / np.pi] - [1, 0]).clamp(-1, 1).float()
+        wanted = (
+            torch.tensor((twist[:, [0, 2]] - [lowest, 0]) * [2 / (1 - lowest), 3 / np.pi] - [1, 0]).clamp(-1, 1).float()
+        )
         torch.testing.assert_close(environment.observe()[1][:, -2:], wanted, atol=2e-3, rtol=0)
         environment.restart(done)
 

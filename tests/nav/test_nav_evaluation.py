@@ -82,9 +82,12 @@ def test_it_drives_at_the_speeds_of_the_policys_card(untrained):
     assert (card.action["forward_speed"], card.action["yaw_rate"]) == ([0.0, 0.6], [-0.8, 0.8])
     robot = describe_episodes(card, NavEvaluation()).robot
     assert (robot.max_speed, robot.max_yaw_rate) == (0.6, 0.8)
-    backwards = replace(card, action={"forward_speed": [-0.3, 0.6]})
-    with pytest.raises(InputError, match="drives from 0 m/s up"):
-        describe_episodes(backwards, NavEvaluation())
+    backwards = make_card("back", replace(slow, robot=replace(slow.robot, min_speed=-0.3)), 7, "abc")
+    assert backwards.action["forward_speed"] == [-0.3, 0.6]
+    assert describe_episodes(backwards, NavEvaluation()).robot.min_speed == -0.3
+    restless = replace(card, action={"forward_speed": [0.1, 0.6]})
+    with pytest.raises(InputError, match="can stand still"):
+        describe_episodes(restless, NavEvaluation())
 
 
 def record(success: bool, spl: float, geodesic: float = 6.0) -> NavRecord:

@@ -49,10 +49,10 @@ class NavStep(NamedTuple):
 class NavEnvironment:
     """Robots that drive to goals.
 
-    An action in [-1, 1]² holds for 0.5 s: forward speed (a0 + 1) / 2 x 1 m/s, yaw rate a1 x 60 deg/s. A step whose
-    swept footprint would touch a wall or furniture is cancelled as a whole, or all but its turn
-    (``ExecutionConfig.give_way``). An episode ends with success as soon as the robot is near its goal; there is no
-    stop action.
+    An action in [-1, 1]² holds for 0.5 s: forward speed from 0 to 1 m/s and yaw rate within 60 deg/s, unless
+    ``RobotConfig`` says otherwise. A step whose swept footprint would touch a wall or furniture is cancelled as a
+    whole, or all but its turn (``ExecutionConfig.give_way``). An episode ends with success as soon as the robot is near
+    its goal; there is no stop action.
 
     Nothing in ``step`` waits for the device. The same seed, configuration and homes give the same episodes.
 

@@ -133,12 +133,13 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
     robot = config.robot
     if card is not None:
         span = VelocityRange.of(card)
-        if span.forward_speed[0] != 0 or span.yaw_rate[0] != -span.yaw_rate[1]:
+        if span.forward_speed[0] > 0 or span.yaw_rate[0] != -span.yaw_rate[1]:
             raise InputError(
                 f"{card.name}: its card has forward_speed {list(span.forward_speed)}, yaw_rate {list(span.yaw_rate)}; "
-                "the kinematic environment drives from 0 m/s up and turns to both sides alike"
+                "in the kinematic environment a robot can stand still and turns to both sides alike"
             )
-        robot = replace(robot, max_speed=span.forward_speed[1], max_yaw_rate=span.yaw_rate[1])
+        low, high = span.forward_speed
+        robot = replace(robot, min_speed=low, max_speed=high, max_yaw_rate=span.yaw_rate[1])
     return replace(
         config,
         robot=robot,

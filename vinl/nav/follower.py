@@ -61,7 +61,8 @@ class PathFollower:
         free = self._chance.uniform(size=(2, len(yaw)))
         speed = np.where(self._trouble > 0, np.maximum(free[0] - 0.3, 0.0), speed)
         turn = np.where(self._trouble > 0, 2.0 * free[1] - 1.0, turn)
-        action = np.stack([2.0 * speed / robot.max_speed - 1.0, turn], 1)
+        share = (speed - robot.min_speed) / (robot.max_speed - robot.min_speed)
+        action = np.stack([2.0 * share - 1.0, turn], 1)
         return torch.as_tensor(action, dtype=torch.float32, device=environment.device)
 
     def _aim(self, k: int, xy: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ class Rules:
 
     length: wp.float32
     width: wp.float32
+    min_speed: wp.float32
     max_speed: wp.float32
     max_yaw_rate: wp.float32
     period: wp.float32
@@ -134,7 +135,7 @@ def move_robots(
     gain = robots.gain[n]
     a0 = wp.clamp(action[n][0], -1.0, 1.0)
     a1 = wp.clamp(action[n][1], -1.0, 1.0)
-    v_told = 0.5 * (a0 + 1.0) * rules.max_speed * gain[0]
+    v_told = (rules.min_speed + 0.5 * (a0 + 1.0) * (rules.max_speed - rules.min_speed)) * gain[0]
     w_told = a1 * rules.max_yaw_rate * gain[1]
     # a first-order lag: the mean over the period, and what is left of the old velocity at its end
     mean = float(0.0)
@@ -146,9 +147,11 @@ def move_robots(
     w = w_told + (robots.yaw_rate[n] - w_told) * mean
     v_end = v_told + (robots.speed[n] - v_told) * last
     w_end = w_told + (robots.yaw_rate[n] - w_told) * last
-    pace = v / rules.max_speed
+    pace = wp.abs(v) / rules.max_speed
     noisy = gain[3] * pace
-    v = wp.max(v + rules.speed_noise * wp.randn(state) * noisy, 0.0)
+    v = v + rules.speed_noise * wp.randn(state) * noisy
+    if rules.min_speed == 0.0:
+        v = wp.max(v, 0.0)
     slip = rules.side_slip * wp.randn(state) * noisy
     turning = 0.5 + 0.5 * wp.min(wp.max(pace, wp.abs(w) / rules.max_yaw_rate), 1.0)
     w = w + gain[2] * pace + rules.yaw_noise * wp.randn(state) * gain[3] * turning
@@ -187,8 +190,9 @@ def move_robots(
     heading = yaw + w * rules.period
     robots.previous[n] = wp.vec2(a0, a1)
     if rules.sees_motion != 0:
+        share = (v - rules.min_speed) / (rules.max_speed - rules.min_speed)
         robots.previous[n] = wp.vec2(
-            wp.clamp(2.0 * v / rules.max_speed - 1.0, -1.0, 1.0), wp.clamp(w / rules.max_yaw_rate, -1.0, 1.0)
+            wp.clamp(2.0 * share - 1.0, -1.0, 1.0), wp.clamp(w / rules.max_yaw_rate, -1.0, 1.0)
         )
     left = wp.sqrt(1.0 - rules.correlation * rules.correlation)
     new_roll = left * wp.randn(state)

@@ -20,13 +20,15 @@ class RobotConfig:
 
     Attributes:
         length, width: of the rectangle that must not touch anything [m] [facts: 0.65 x 0.31].
-        max_speed: forward speed of action 1; action -1 stands still [m/s].
+        min_speed: forward speed of action -1 [m/s]; 0: there is no way back; negative: it walks backwards, unseen.
+        max_speed: forward speed of action 1 [m/s].
         max_yaw_rate: yaw rate of action 1 [rad/s].
         period: an action holds so long [s].
     """
 
     length: float = 0.65
     width: float = 0.31
+    min_speed: float = 0.0
     max_speed: float = 1.0
     max_yaw_rate: float = math.pi / 3
     period: float = 0.5
@@ -34,6 +36,7 @@ class RobotConfig:
     def __post_init__(self) -> None:
         for name in ("length", "width", "max_speed", "max_yaw_rate", "period"):
             check_number(f"robot.{name}", getattr(self, name), 1e-3, 10.0)
+        check_number("robot.min_speed", self.min_speed, -10.0, 0.0)
         if self.width > self.length:
             raise InputError("robot.width must not exceed robot.length")
 

@@ -21,7 +21,8 @@ def write_rules(config: NavConfig) -> Any:
     )
     rules = Rules()
     rules.length, rules.width = robot.length, robot.width
-    rules.max_speed, rules.max_yaw_rate, rules.period = robot.max_speed, robot.max_yaw_rate, robot.period
+    rules.min_speed, rules.max_speed = robot.min_speed, robot.max_speed
+    rules.max_yaw_rate, rules.period = robot.max_yaw_rate, robot.period
     rules.success_radius = episodes.success_radius
     rules.least, rules.most = episodes.distance
     rules.start_speed = wp.vec2(*episodes.start_speed)

@@ -276,6 +276,7 @@ def make_card(
         config.previous,
         config.robot.max_speed,
         config.robot.max_yaw_rate,
+        config.robot.min_speed,
         training=training,
         seed=config.seed,
         samples=samples,

@@ -131,12 +131,13 @@ def navigation_card(
     previous: str = "action",
     max_speed: float = FORWARD_SPEED[1],
     max_yaw_rate: float = YAW_RATE[1],
+    min_speed: float = FORWARD_SPEED[0],
     **rest: Any,
 ) -> PolicyCard:
     """A navigation card with the table and the action scaling that ``NavActor`` has; ``previous`` as for
-    ``navigation_table``, ``max_speed`` [m/s] and ``max_yaw_rate`` [rad/s] as in training, ``rest`` are further
-    fields."""
-    action = {"forward_speed": [0.0, max_speed], "yaw_rate": [-max_yaw_rate, max_yaw_rate]}
+    ``navigation_table``, ``min_speed``, ``max_speed`` [m/s] and ``max_yaw_rate`` [rad/s] as in training, ``rest`` are
+    further fields."""
+    action = {"forward_speed": [min_speed, max_speed], "yaw_rate": [-max_yaw_rate, max_yaw_rate]}
     return PolicyCard("navigation", name, network, navigation_table(previous), action, camera, **rest)
 
 
