@@ -25,7 +25,7 @@ from vinl.policies.card import locomotion_card
 from vinl.policies.io import find_policy, load_policy, save_policy
 from vinl.policies.networks import MapActor, build_network
 from vinl.rl.models import BlindModel
-from vinl.robot.aliengo import FOOT_GEOMS, home_qpos
+from vinl.robot.aliengo import DEFAULT_POSE, FOOT_GEOMS, home_qpos
 from vinl.robot.model import robot_spec
 from vinl.robot.observation import OBSERVATION_SIZE
 from vinl.world.terrain import TILE, build_terrain
@@ -193,6 +193,11 @@ def test_feet_and_shanks_on_a_block_are_counted_and_those_beside_it_are_not(env)
     state = jax.jit(env._first_state)(jax.random.PRNGKey(0))
     n = len(poses)
     body = state.body._replace(qpos=jnp.asarray(np.stack(poses), jnp.float32), qvel=jnp.zeros((n, 18)))
+    simulation, still = env.simulation, jnp.tile(jnp.asarray(DEFAULT_POSE, jnp.float32), (n, 1))
+    _, contacts, _ = jax.jit(simulation.step)(simulation.ground, body, still, state.friction, state.added_mass)
+    gap = np.asarray(contacts.foot_gap)[:, 0].reshape(4, 4)
+    np.testing.assert_allclose(gap[:, 1:3], 0.03, atol=0.01)  # above it and before it
+    assert (gap[:, [0, 3]] < 0.01).all()
     quiet = {"life": state.life + 1, "step": jnp.zeros(n, jnp.int32), "push_left": jnp.full(n, 99, jnp.int32)}
     env.state = jax.device_put(state._replace(body=body, **quiet), jax.devices()[0])
     env.step(jnp.zeros((n, 12)))
