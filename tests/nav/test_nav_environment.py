@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 import torch
 
 from vinl.config.errors import InputError
 from vinl.nav.config import EpisodeConfig
 from vinl.nav.environment import NavEnvironment
+from vinl.policies.velocity_range import VelocityRange
 
 
 def test_steps_are_well_formed(config, homes):
@@ -107,9 +107,7 @@ def test_the_motion_seen_is_what_the_poses_say(config, homes, lowest):
         before = poses()
         _, done, _ = environment.advance(torch.rand(200, 2) * 2 - 1)
         twist = measure_twist(before, poses(), 0.5)
-        wanted = (
-            torch.tensor((twist[:, [0, 2]] - [lowest, 0]) * [2 / (1 - lowest), 3 / np.pi] - [1, 0]).clamp(-1, 1).float()
-        )
+        wanted = torch.as_tensor(VelocityRange((lowest, 1.0)).action(twist[:, [0, 2]]))
         torch.testing.assert_close(environment.observe()[1][:, -2:], wanted, atol=2e-3, rtol=0)
         environment.restart(done)
 

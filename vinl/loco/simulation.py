@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float
 from mujoco import mjx
 from scipy import ndimage
 
-from vinl.robot.aliengo import FOOT_GEOMS, SHANK_SPHERES, SUBSTEPS, TRUNK_SPHERES
+from vinl.robot.aliengo import FOOT_GEOMS, FOOT_RADIUS, SHANK_SPHERES, SUBSTEPS, TRUNK_SPHERES
 from vinl.robot.aliengo import LEGS as LEG_NAMES
 from vinl.robot.model import robot_spec
 from vinl.world.blocks import Blocks
@@ -34,8 +34,7 @@ SHANK_REACH = 0.018
 """A shank nearer than this to a block [m] touches it: the capsule's 0.0145 m and the error of the grid. Chosen so that
 the count agrees with MuJoCo C's contacts of the capsule on the same motion."""
 
-_FOOT_RADIUS = 0.0265
-FOOT_REACH = _FOOT_RADIUS + 0.02
+FOOT_REACH = FOOT_RADIUS + 0.02
 """A foot whose middle is farther than this from any block [m] does not touch one: what it touches then is the slope
 that the height field has for the block's side, up to a cell wide."""
 
@@ -243,7 +242,7 @@ class Simulation:
                 block = jnp.concatenate([block[:FEET] & (free < FOOT_REACH), block[FEET:]])
             down = jnp.any(on[LEGS:] & (up[LEGS:] > 0.5))
             new = jnp.concatenate([jnp.any(on, 1), block, wall, beside, down[None]])
-            gap = jnp.minimum(gap, free - _FOOT_RADIUS)
+            gap = jnp.minimum(gap, free - FOOT_RADIUS)
             return (data.qpos, data.qvel, data.qacc_warmstart, flags | new, gap, data.actuator_force), None
 
         flags = jnp.zeros(3 * LEGS + TRUNK + FEET + 1, bool)

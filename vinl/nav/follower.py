@@ -9,6 +9,7 @@ from torch import Tensor
 
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.home_builder import FIELD_RESOLUTION, FINE
+from vinl.policies.velocity_range import VelocityRange
 from vinl.world.geodesic import comfortable_path
 from vinl.world.grid import GridFrame
 
@@ -61,9 +62,8 @@ class PathFollower:
         free = self._chance.uniform(size=(2, len(yaw)))
         speed = np.where(self._trouble > 0, np.maximum(free[0] - 0.3, 0.0), speed)
         turn = np.where(self._trouble > 0, 2.0 * free[1] - 1.0, turn)
-        share = (speed - robot.min_speed) / (robot.max_speed - robot.min_speed)
-        action = np.stack([2.0 * share - 1.0, turn], 1)
-        return torch.as_tensor(action, dtype=torch.float32, device=environment.device)
+        span = VelocityRange((robot.min_speed, robot.max_speed), (-1.0, 1.0))  # turn is a share of the fastest already
+        return torch.as_tensor(span.action(np.stack([speed, turn], 1)), device=environment.device)
 
     def _aim(self, k: int, xy: np.ndarray) -> np.ndarray:
         """The point of the way to head for."""
