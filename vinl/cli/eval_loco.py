@@ -22,9 +22,10 @@ class Options:
     terrain: str = "flat"
     """flat, rough (the terrains of stage 1), blocks or rooms (small ones, with corners, doorways and blocks)."""
     commands: str | None = None
-    """turns (0.3-1 m/s and up to 1 rad/s; the default on blocks), straight, spin (on the spot), navigator (0-1 m/s
-    and up to 60 deg/s, changed every 0.5-4 s, standing and turning on the spot included; the default in rooms),
-    trained (what the policy was trained for; the default elsewhere) or forward (the same without sideways)."""
+    """turns (0.3-1 m/s and up to 1 rad/s; the default on blocks), straight, spin (on the spot), back (0.2-0.4 m/s
+    backwards), navigator (0-1 m/s and up to 60 deg/s, changed every 0.5-4 s, standing and turning on the spot included;
+    the default in rooms), trained (what the policy was trained for; the default elsewhere) or forward (the same without
+    sideways)."""
     robots: int = 64
     """How many robots for each policy."""
     seconds: float = 20.0

@@ -51,6 +51,7 @@ FIXED = {
     "turns": CommandRanges((0.3, 1.0), _LEVEL),
     "straight": CommandRanges((0.3, 1.0), _LEVEL, _LEVEL),
     "spin": CommandRanges(_LEVEL, _LEVEL, _TURN),
+    "back": CommandRanges((-0.4, -0.2), _LEVEL, (-0.5, 0.5), hold=(1.0, 4.0)),
     "navigator": CommandRanges(
         (0.0, 1.0), _LEVEL, _TURN, hold=(0.5, 4.0), hold_step=0.5, stand_share=0.1, turn_share=0.15
     ),

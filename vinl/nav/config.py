@@ -181,3 +181,5 @@ class NavConfig:
             raise InputError(f"previous must be one of {', '.join(PREVIOUS)}, got {self.previous!r}")
         if not 0 <= self.seed < 2**31:
             raise InputError(f"seed must lie between 0 and 2147483647, got {self.seed}")
+        if self.execution.snag > 0 and self.robot.min_speed >= 0:
+            raise InputError("execution.snag needs a way back: set robot.min_speed below 0")
