@@ -9,8 +9,11 @@ from vinl.robot.observation import (
     SCALE,
     SCAN_POINTS,
     SCAN_SIZE,
+    SCANS,
+    STANDARD_SCAN,
     TABLE,
     describe,
+    find_scan,
     observe,
 )
 
@@ -51,6 +54,27 @@ def test_scan_points():
     assert SCAN_POINTS.shape == (187, 2)
     assert np.allclose(SCAN_POINTS[0], [-0.8, -0.5]) and np.allclose(SCAN_POINTS[-1], [0.8, 0.5])
     assert np.allclose(SCAN_POINTS[1], [-0.8, -0.4]) and np.allclose(SCAN_POINTS[93], 0.0)
+
+
+def test_the_fine_scan_contains_the_standard_one():
+    fine = SCANS[0.05]
+    assert fine.points.shape == (693, 2) and fine.observation_size == 741
+    assert (fine.points[fine.places_of(STANDARD_SCAN)] == SCAN_POINTS).all()  # to the last bit: the same cells
+    assert len(np.unique(fine.points.round(6), axis=0)) == 693
+    assert (np.abs(fine.points).max(0) == np.abs(SCAN_POINTS).max(0)).all()
+    assert (fine.scale[:235] == SCALE).all() and (fine.scale[48:] == 5.0).all()
+    assert (fine.noise[:235] == NOISE).all() and (fine.noise[48:] == np.float32(0.5)).all()
+    assert describe(fine)[-1] == {**describe()[-1], "size": 693}
+    assert [find_scan(n) for n in (48, 235, 741, 300)] == [None, STANDARD_SCAN, fine, None]
+    with pytest.raises(ValueError, match=r"lacks points"):
+        STANDARD_SCAN.places_of(fine)
+
+
+def test_the_ground_must_be_that_of_a_scan():
+    *state, _ = random_state(2)
+    assert observe(np, *state, np.zeros((2, 693))).shape == (2, 741)
+    with pytest.raises(ValueError, match="no height scan has 188 points"):
+        observe(np, *state, np.zeros((2, 188)))
 
 
 def test_a_robot_that_stands_still_observes_almost_nothing():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from vinl.robot.aliengo import home_qpos
-from vinl.robot.observation import SCAN_POINTS
+from vinl.robot.observation import SCAN_POINTS, SCANS, STANDARD_SCAN
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.grid import GridFrame
 
@@ -54,6 +54,13 @@ def test_off_the_grid_reads_the_edge():
     far = np.array([home_qpos(1e7, 1e7), home_qpos(-1e12, -1e12)])
     scan = scan_ground(np, heights, FRAME, far)
     assert (scan[0] == 7.0).all() and (scan[1] == 0.0).all()
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_the_fine_scan_reads_what_the_standard_one_reads(dtype: type):
+    heights, qpos, fine = np.random.default_rng(0).random(FRAME.shape), poses(50).astype(dtype), SCANS[0.05]
+    scan = scan_ground(np, heights, FRAME, qpos, fine)
+    assert (scan[:, fine.places_of(STANDARD_SCAN)] == scan_ground(np, heights, FRAME, qpos)).all()
 
 
 def test_heights_must_fit_the_frame():

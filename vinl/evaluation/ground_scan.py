@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from vinl.robot.observation import STANDARD_SCAN, HeightScan
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
@@ -34,9 +35,15 @@ class GroundScan:
 
     The grids of the episodes are stacked along y; the look-up of robot k is moved to grid k. Episodes without blocks
     share one grid.
+
+    Args:
+        plan: walls and furniture.
+        blocks: of each episode.
+        scan: where to read.
     """
 
-    def __init__(self, plan: FloorPlan, blocks: Sequence[Blocks]) -> None:
+    def __init__(self, plan: FloorPlan, blocks: Sequence[Blocks], scan: HeightScan = STANDARD_SCAN) -> None:
+        self._scan = scan
         bare = rasterise_plan(plan)
         rows, columns = bare.frame.shape
         if any(len(b) for b in blocks):
@@ -51,8 +58,8 @@ class GroundScan:
         self._heights = heights.ravel()
         self._frame = GridFrame(bare.frame.x0, bare.frame.y0, bare.frame.resolution, (len(heights) * rows, columns))
 
-    def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 187"]:
+    def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n points"]:
         """Height of the ground [m] under the scan points of every robot."""
         at = qpos[:, :7].copy()
         at[:, 1] += self._shift
-        return scan_ground(np, self._heights, self._frame, at)
+        return scan_ground(np, self._heights, self._frame, at, self._scan)

@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 from vinl.config.errors import InputError
 from vinl.evaluation.ground_scan import GroundScan
 from vinl.evaluation.scene import build_scene
+from vinl.robot.observation import STANDARD_SCAN, HeightScan
 from vinl.sensing.depth import Mesh
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.blocks import Blocks
@@ -119,12 +120,12 @@ class Ground:
 class FieldScan(GroundScan):
     """Reads the height scan of robots that all walk on one height field."""
 
-    def __init__(self, field: HeightField) -> None:
-        self._field = field
+    def __init__(self, field: HeightField, scan: HeightScan = STANDARD_SCAN) -> None:
+        self._field, self._scan = field, scan
 
-    def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 187"]:
+    def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n points"]:
         """Height of the ground [m] under the scan points of every robot."""
-        return scan_ground(np, self._field.heights, self._field.frame, qpos)
+        return scan_ground(np, self._field.heights, self._field.frame, qpos, self._scan)
 
 
 def build_ground(config: GroundConfig) -> Ground:

@@ -14,7 +14,7 @@ from vinl.evaluation.eyes import Eyes, open_eyes
 from vinl.evaluation.ground_scan import GroundScan
 from vinl.policies.policy import Policy
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
-from vinl.robot.observation import OBSERVATION_SIZE, PROPRIOCEPTION_SIZE, SCAN_SIZE, observe
+from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE, SCANS, find_scan, observe
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
 
@@ -25,11 +25,12 @@ MOUNT_REACH = 0.25
 class Senses:
     """Asks a locomotor for the next action of all robots of a unit.
 
-    A policy of 235 numbers gets the height scan, one of 48 only proprioception; one with a camera gets depth too.
+    A policy of 235 numbers gets the height scan, one of 741 the fine one, one of 48 only proprioception; one with a
+    camera gets depth too.
 
     Args:
         locomotor: the policy.
-        scan: reads the height scan; needed only by a policy that observes it.
+        scan: reads the height scan that the policy observes; None: it observes none.
         eyes: renders depth; needed only by a policy with a camera.
     """
 
@@ -57,7 +58,8 @@ class Senses:
 
 def give_senses(locomotor: Policy, plan: FloorPlan, blocks: Sequence[Blocks], ceiling: float | None = None) -> Senses:
     """The senses of robots in a floor plan, each with its own clutter, see ``open_eyes``."""
-    scan = GroundScan(plan, blocks) if locomotor.card.observation_size > PROPRIOCEPTION_SIZE else None
+    points = find_scan(locomotor.card.observation_size)
+    scan = None if points is None else GroundScan(plan, blocks, points)
     eyes = None if locomotor.camera is None else open_eyes(plan, blocks, locomotor.camera, ceiling)
     return Senses(locomotor, scan, eyes)
 
@@ -104,13 +106,14 @@ def check_senses(policy: Policy) -> None:
     """Refuse a policy that is no locomotor, or observes what there is not.
 
     Raises:
-        InputError: it is of another kind, or its table is neither the whole one nor proprioception alone.
+        InputError: it is of another kind, or its table is neither one with a height scan nor proprioception alone.
     """
     card = policy.card
     if card.kind != "locomotion":
         raise InputError(f"{card.name} is a {card.kind} policy; a locomotor (--loco, --policy) is a locomotion policy")
-    if card.observation_size not in (PROPRIOCEPTION_SIZE, OBSERVATION_SIZE):
+    if card.observation_size != PROPRIOCEPTION_SIZE and find_scan(card.observation_size) is None:
+        known = " or ".join(f"{scan.observation_size}" for scan in SCANS.values())
         raise InputError(
             f"policy {card.name} observes {card.observation_size} numbers; the robot has {PROPRIOCEPTION_SIZE}, or "
-            f"{OBSERVATION_SIZE} with the height scan"
+            f"{known} with the height scan"
         )

@@ -16,7 +16,7 @@ from vinl.evaluation.senses import Senses
 from vinl.evaluation.touches import BlockTouches
 from vinl.evaluation.walker import joint_targets
 from vinl.policies.policy import Policy
-from vinl.robot.observation import PROPRIOCEPTION_SIZE
+from vinl.robot.observation import find_scan
 from vinl.robot.rotation import rotate_inverse
 
 SETTLED = 50
@@ -77,7 +77,8 @@ def run_trial(
 
 def sense_ground(policy: Policy, ground: Ground, n: int) -> Senses:
     """What a policy of n robots observes on a ground that all of them walk on."""
-    scan = FieldScan(ground.field) if policy.card.observation_size > PROPRIOCEPTION_SIZE else None
+    points = find_scan(policy.card.observation_size)
+    scan = None if points is None else FieldScan(ground.field, points)
     eyes = None if policy.camera is None else Eyes([ground.mesh()], [0] * n, policy.camera)
     return Senses(policy, scan, eyes)
 

@@ -8,6 +8,7 @@ from typing import Literal
 from vinl.config.errors import InputError
 from vinl.loco.student_config import StudentConfig
 from vinl.robot.aliengo import KD, KP
+from vinl.robot.observation import SCANS, HeightScan
 from vinl.world.terrain import TerrainConfig
 
 Range = tuple[float, float]
@@ -275,6 +276,8 @@ class LocoConfig:
         seed: of everything random.
         episode_length: [s] [ViNL config: 20].
         kp, kd: joint gains [N m / rad, N m s / rad].
+        scan_spacing: of the points at which actor and critic read the ground, 0.1 (187 of them) or 0.05 (693: an edge
+            as exactly as the ground's cells of 5 cm have it) [m].
         ppo, anneal: not used by stage 3.
         student: stage 3 alone.
     """
@@ -287,6 +290,7 @@ class LocoConfig:
     episode_length: float = 20.0
     kp: float = KP
     kd: float = KD
+    scan_spacing: float = 0.1
     terrain: TerrainConfig = field(default_factory=TerrainConfig)
     commands: CommandConfig = field(default_factory=CommandConfig)
     rewards: RewardConfig = field(default_factory=RewardConfig)
@@ -309,3 +313,11 @@ class LocoConfig:
             raise InputError(f"episode_length must be positive, got {self.episode_length}")
         if self.kp <= 0 or self.kd < 0:
             raise InputError("kp must be positive and kd not negative")
+        if self.scan_spacing not in SCANS:
+            known = " or ".join(f"{spacing:g}" for spacing in SCANS)
+            raise InputError(f"scan_spacing must be {known} m, got {self.scan_spacing:g}")
+
+    @property
+    def scan(self) -> HeightScan:
+        """The height scan with that spacing."""
+        return SCANS[self.scan_spacing]

@@ -19,7 +19,7 @@ from vinl.loco.rewards import Motion, reward_terms
 from vinl.loco.simulation import Body, Contacts, Ground, Simulation
 from vinl.loco.state import State, count_steps, first_state, start_body, strip_weak_types
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
-from vinl.robot.observation import CLIP, NOISE, OBSERVATION_SIZE, observe
+from vinl.robot.observation import CLIP, observe
 from vinl.robot.rotation import rotate_inverse
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.terrain import build_terrain
@@ -41,13 +41,14 @@ class StepResult(NamedTuple):
     """What a step gives to the learner.
 
     Attributes:
-        observation: (n, 235) with noise, for the actor; exact: (n, 235) without, for the critic.
+        observation: (n, numbers) with noise, for the actor; exact: the same without, for the critic; 235 numbers, or
+            741 with the fine height scan.
         reward: (n,); done: (n,) 1 where fallen or out of time; timeout: (n,) 1 where out of time.
         pose: (n, 7) position [m] and quaternion of the trunk, which belong to the observation.
     """
 
-    observation: Float[Array, "n 235"]
-    exact: Float[Array, "n 235"]
+    observation: Float[Array, "n numbers"]
+    exact: Float[Array, "n numbers"]
     reward: Float[Array, " n"]
     done: UInt8[Array, " n"]
     timeout: UInt8[Array, " n"]
@@ -92,7 +93,7 @@ class LocoEnvironment:
 
     # ---- what the learner calls -----------------------------------------------------------------------------------
 
-    def observe(self) -> tuple[Float[Array, "n 235"], Float[Array, "n 235"]]:
+    def observe(self) -> tuple[Float[Array, "n numbers"], Float[Array, "n numbers"]]:
         """The observations of the present state, with noise and without."""
         return self._look(self.simulation.ground, self.state)
 
@@ -133,12 +134,15 @@ class LocoEnvironment:
     def _first_state(self, key: Array) -> State:
         return first_state(self.config, self._starts, key)
 
-    def _observations(self, ground: Ground, state: State) -> tuple[Float[Array, "n 235"], Float[Array, "n 235"]]:
+    def _observations(
+        self, ground: Ground, state: State
+    ) -> tuple[Float[Array, "n numbers"], Float[Array, "n numbers"]]:
         """With noise and without. The noise is the state's own, so that a state that is loaded observes the same."""
-        heights = scan_ground(jnp, ground.heights, self.simulation.frame, state.body.qpos)
+        scan = self.config.scan
+        heights = scan_ground(jnp, ground.heights, self.simulation.frame, state.body.qpos, scan)
         exact = observe(jnp, state.body.qpos, state.body.qvel, state.command, state.action, heights)
-        noise = jax.random.uniform(jax.random.fold_in(state.key, 1), (self.num_envs, OBSERVATION_SIZE))
-        return exact + self.config.randomisation.observation_noise * jnp.asarray(NOISE) * (2 * noise - 1), exact
+        noise = jax.random.uniform(jax.random.fold_in(state.key, 1), exact.shape)
+        return exact + self.config.randomisation.observation_noise * jnp.asarray(scan.noise) * (2 * noise - 1), exact
 
     def _advance(
         self, ground: Ground, old: State, lost: Lost, given: Float[Array, "n 12"], rewards: dict[str, Any]

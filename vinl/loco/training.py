@@ -173,5 +173,5 @@ def make_card(
     """The card of a policy of this training; ``origin`` describes the policy that it started from."""
     action = {**describe_action(), "kp": config.kp, "kd": config.kd}
     training = {**dump_config(config), **({"origin": origin} if origin else {})}
-    card = locomotion_card(name, network, training=training, seed=config.seed, samples=samples, commit=commit)
-    return PolicyCard(**{**vars(card), "action": action})
+    learned = {"seed": config.seed, "samples": samples, "commit": commit}
+    return locomotion_card(name, network, action, spacing=config.scan_spacing, training=training, **learned)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
+import torch
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
@@ -15,6 +17,7 @@ from vinl.policies.depth_actor import DepthActor
 from vinl.policies.io import find_policy, load_policy
 from vinl.policies.networks import BlindActor, MapActor
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
+from vinl.robot.observation import PROPRIOCEPTION_SIZE, STANDARD_SCAN, HeightScan, find_scan
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,9 @@ class WarmStart:
 def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
     """The networks of a policy (actor alone) or of a training run (actor and critic).
 
+    One that reads fewer points of the ground than the training gives is widened: it acts as before until it learns
+    what the new points are good for.
+
     Args:
         name_or_path: ``"rough"``, ``"vinl/rough"``, a policy folder or the folder of a training run.
         config: of the training that shall start from them.
@@ -67,15 +73,19 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
     """
     policy = load_policy(name_or_path)
     network, p = policy.network, config.ppo
-    fresh = MapActor(encoder=p.encoder, code=p.code, actor=p.actor) if p.map else BlindActor(actor=p.actor)
-    wanted = fresh.describe()
-    if network.describe() != wanted:
+    sizes: dict[str, Any] = {"scan": config.scan.size, "actor": p.actor}
+    fresh = MapActor(encoder=p.encoder, code=p.code, **sizes) if p.map else BlindActor(**sizes)
+    given, wanted = network.describe(), fresh.describe()
+    if given != wanted and given != {**wanted, "scan": STANDARD_SCAN.size}:
         raise InputError(
-            f"--from {name_or_path}: its network {_list(network.describe())} is not that of this training "
-            f"{_list(wanted)}; set ppo.map, ppo.encoder, ppo.code and ppo.actor to its own, or give another policy"
+            f"--from {name_or_path}: its network {_list(given)} is not that of this training "
+            f"{_list(wanted)}; set scan_spacing, ppo.map, ppo.encoder, ppo.code and ppo.actor to its own, or give "
+            "another policy"
         )
     check_gains(name_or_path, policy.card, config)
     actor = {name: weight.clone() for name, weight in network.state_dict().items()}
+    if p.map:
+        actor["encoder.0.weight"] = widen_scan(actor["encoder.0.weight"], 0, config.scan)
     critic = _load_critic(name_or_path, config)
     return WarmStart(actor, critic, find_origin(policy.card, network, critic is not None))
 
@@ -88,7 +98,8 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origi
         config: of the student's training.
 
     Raises:
-        InputError: no such policy, one that does not read the height scan, or one with other joint gains.
+        InputError: no such policy, one that does not read the height scan of this training, or one with other joint
+            gains.
     """
     policy = load_policy(name_or_path)
     if not isinstance(policy.network, MapActor):
@@ -96,6 +107,13 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origi
         raise InputError(
             f"--from {name_or_path}: a student learns from a locomotor with a height scan (MapActor, such as "
             f"vinl/teacher); this is {kind}"
+        )
+    given = find_scan(policy.card.observation_size)
+    if given is None or given != config.scan:
+        own = "" if given is None else f"; set scan_spacing={given.spacing:g}"
+        raise InputError(
+            f"--from {name_or_path}: it observes {policy.card.observation_size} numbers, this training gives "
+            f"{config.scan.observation_size}{own}"
         )
     check_gains(name_or_path, policy.card, config)
     return policy.network, find_origin(policy.card, policy.network, critic=False)
@@ -130,6 +148,28 @@ _KINDS = {
 }
 
 
+def widen_scan(weight: Tensor, ahead: int, scan: HeightScan) -> Tensor:
+    """The first layer of a network for a finer height scan than it was trained with.
+
+    The weights of each old point go to the same point. All others are zero, so that the network answers as before.
+
+    Args:
+        weight: (width, ahead + k), for a scan of k points.
+        ahead: inputs before the scan.
+        scan: of the new network.
+
+    Returns:
+        (width, ahead + scan.size); the weight itself if it is of this scan.
+    """
+    old = find_scan(PROPRIOCEPTION_SIZE + weight.shape[1] - ahead)
+    if old is None or old == scan:
+        return weight
+    places = ahead + torch.from_numpy(scan.places_of(old))
+    wide = weight.new_zeros(len(weight), ahead + scan.size)
+    wide[:, :ahead], wide[:, places] = weight[:, :ahead], weight[:, ahead:]
+    return wide
+
+
 def check_gains(name_or_path: str, card: PolicyCard, config: LocoConfig) -> None:
     """Refuse a policy that was trained with other joint gains.
 
@@ -160,7 +200,9 @@ def _load_critic(name_or_path: str, config: LocoConfig) -> dict[str, Tensor] | N
             f"{folder / CHECKPOINT} holds no critic; give {folder / 'policy'} to start from the actor alone"
         )
     widths = tuple(w.shape[0] for name, w in critic.items() if name.startswith("mlp.") and w.ndim == 2)
-    return critic if widths == (*config.ppo.critic, 1) else None
+    if widths != (*config.ppo.critic, 1):
+        return None
+    return critic | {"mlp.0.weight": widen_scan(critic["mlp.0.weight"], PROPRIOCEPTION_SIZE, config.scan)}
 
 
 def _list(description: dict[str, object]) -> str:

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP
-from vinl.robot.observation import describe
+from vinl.robot.observation import SCANS, describe
 
 SCHEMA = 1
 """Version of ``card.json``."""
@@ -90,7 +90,12 @@ def describe_action() -> dict[str, Any]:
 
 
 def locomotion_card(
-    name: str, network: dict[str, Any], action: dict[str, Any] | None = None, scan: bool = True, **rest: Any
+    name: str,
+    network: dict[str, Any],
+    action: dict[str, Any] | None = None,
+    scan: bool = True,
+    spacing: float = 0.1,
+    **rest: Any,
 ) -> PolicyCard:
     """A locomotion card with this robot's observation table and, unless given, action; ``rest`` are further fields.
 
@@ -99,8 +104,9 @@ def locomotion_card(
         network: as ``PolicyNetwork.describe`` gives it.
         action: scale, default pose and gains.
         scan: whether it observes the height scan; a policy that sees through a camera does not.
+        spacing: of the scan's points, one of ``robot.observation.SCANS`` [m].
     """
-    table = describe() if scan else describe()[:-1]
+    table = describe(SCANS[spacing])[: None if scan else -1]
     return PolicyCard("locomotion", name, network, table, action or describe_action(), **rest)
 
 

@@ -39,7 +39,8 @@ class Policy(Protocol):
 
 
 class LocomotionPolicy:
-    """Observations (n, 235) to actions (n, 12) at 50 Hz, without noise, on the device of its network."""
+    """Observations (n, 235), or (n, 741) with the fine height scan, to actions (n, 12) at 50 Hz, without noise, on the
+    device of its network."""
 
     camera: Camera | None = None
     """It needs no camera."""
@@ -57,7 +58,8 @@ class LocomotionPolicy:
         """Actions for scaled observations.
 
         Args:
-            observation: (n, 235) in the order of the card's observation table, numpy or torch, any float type.
+            observation: (n, card.observation_size) in the order of the card's observation table, numpy or torch, any
+                float type.
             depth: left alone: this policy has no camera.
 
         Returns:

@@ -12,7 +12,7 @@ from tensordict import TensorDict
 from torch import nn
 
 from vinl.policies.networks import BlindActor, MapActor, mlp
-from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE
+from vinl.robot.observation import PROPRIOCEPTION_SIZE
 
 
 class UncheckedGaussian(GaussianDistribution):
@@ -27,7 +27,8 @@ class UncheckedGaussian(GaussianDistribution):
 
 
 class MapModel(MLPModel):
-    """rsl-rl actor that turns the height scan into a short code before the MLP [paper III-A].
+    """rsl-rl actor that turns the height scan into a short code before the MLP [paper III-A]; the scan is all that it
+    is given behind the proprioception.
 
     Args:
         encoder: widths of the encoder's hidden layers.
@@ -36,8 +37,9 @@ class MapModel(MLPModel):
     """
 
     def __init__(self, *args: Any, encoder: Sequence[int] = (128, 64), code: int = 32, **rest: Any) -> None:
-        self._encoder_sizes, self._code_size = (SCAN_SIZE, *encoder, code), code
+        self._code_size = code
         super().__init__(*args, **rest)
+        self._encoder_sizes = (self.obs_dim - PROPRIOCEPTION_SIZE, *encoder, code)
         self.encoder = mlp(self._encoder_sizes, nn.ReLU)
 
     def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> torch.Tensor:
@@ -51,7 +53,8 @@ class MapModel(MLPModel):
     def export(self) -> MapActor:
         """The deterministic actor with the same weights, as policies are shipped."""
         *hidden, actions = _widths(self)
-        actor = MapActor(encoder=self._encoder_sizes[1:-1], code=self._code_size, actor=hidden, actions=actions)
+        scan, *encoder, code = self._encoder_sizes
+        actor = MapActor(scan=scan, encoder=encoder, code=code, actor=hidden, actions=actions)
         actor.load_state_dict(_shipped_names(self))
         return actor
 
@@ -69,7 +72,7 @@ class BlindModel(MLPModel):
     def export(self) -> BlindActor:
         """The deterministic actor with the same weights, as policies are shipped."""
         *hidden, actions = _widths(self)
-        actor = BlindActor(actor=hidden, actions=actions)
+        actor = BlindActor(scan=self.obs_dim - PROPRIOCEPTION_SIZE, actor=hidden, actions=actions)
         actor.load_state_dict(_shipped_names(self))
         return actor
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -30,15 +31,13 @@ class ObservationTerm:
     unit: str
 
 
-SCAN_X = np.arange(-8, 9) * 0.1
-SCAN_Y = np.arange(-5, 6) * 0.1
-SCAN_POINTS = np.stack(np.meshgrid(SCAN_X, SCAN_Y, indexing="ij"), -1).reshape(-1, 2)
-"""The 187 points of the height scan in the heading frame [m], x outer, y inner [ViNL config]."""
+SCAN_REACH = (0.8, 0.5)
+"""Half-lengths of the rectangle about the trunk that the height scan covers, along x and y [m] [ViNL config]."""
 
 SCAN_OFFSET = 0.5
 """The scan reads trunk height minus this minus ground height, held to +-1 m [ViNL code]."""
 
-TABLE = (
+_PROPRIOCEPTION = (
     ObservationTerm("base_linear_velocity", 3, (2.0,), 0.1, "m/s"),
     ObservationTerm("base_angular_velocity", 3, (0.25,), 0.2, "rad/s"),
     ObservationTerm("projected_gravity", 3, (1.0,), 0.05, "1"),
@@ -46,28 +45,83 @@ TABLE = (
     ObservationTerm("joint_position", 12, (1.0,), 0.01, "rad"),
     ObservationTerm("joint_velocity", 12, (0.05,), 1.5, "rad/s"),
     ObservationTerm("previous_action", 12, (1.0,), 0.0, "1"),
-    ObservationTerm("height_scan", 187, (5.0,), 0.1, "m"),
 )
-"""The 235 numbers in their order, with scales and training noise of legged_gym [ViNL config]."""
-
-PROPRIOCEPTION_SIZE = sum(term.size for term in TABLE[:-1])
-SCAN_SIZE = TABLE[-1].size
-OBSERVATION_SIZE = PROPRIOCEPTION_SIZE + SCAN_SIZE
+PROPRIOCEPTION_SIZE = sum(term.size for term in _PROPRIOCEPTION)
 CLIP = 100.0
 """Observations are held to +- this [ViNL config]."""
 
 
-def _per_number(values: list[tuple[float, ...]]) -> np.ndarray:
-    return np.concatenate([np.broadcast_to(v, term.size) for v, term in zip(values, TABLE, strict=True)]).astype(
-        np.float32
-    )
+@dataclass(frozen=True)
+class HeightScan:
+    """Where a locomotor reads the ground, and the whole observation that ends with what it reads there.
+
+    Attributes:
+        spacing: of the points, along x and y [m].
+    """
+
+    spacing: float
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """(size, 2) in the heading frame [m], x outer, y inner."""
+        steps = [round(reach / self.spacing) for reach in SCAN_REACH]
+        x, y = (np.arange(-n, n + 1) * self.spacing for n in steps)
+        return np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
+
+    @property
+    def size(self) -> int:
+        """Numbers of the scan alone."""
+        return len(self.points)
+
+    @property
+    def observation_size(self) -> int:
+        """Numbers of the whole observation."""
+        return PROPRIOCEPTION_SIZE + self.size
+
+    @cached_property
+    def table(self) -> tuple[ObservationTerm, ...]:
+        """The numbers in their order, with scales and training noise of legged_gym [ViNL config]."""
+        return (*_PROPRIOCEPTION, ObservationTerm("height_scan", self.size, (5.0,), 0.1, "m"))
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """(observation_size,) factor of every number."""
+        return self._per_number([term.scale for term in self.table])
+
+    @cached_property
+    def noise(self) -> np.ndarray:
+        """(observation_size,) half-width of the training noise of every number, after scaling."""
+        return self.scale * self._per_number([(term.noise,) for term in self.table])
+
+    def places_of(self, coarse: HeightScan) -> np.ndarray:
+        """(coarse.size,) which of these points are those of a coarser scan, in its order.
+
+        Raises:
+            ValueError: some of its points are not among these.
+        """
+        apart = np.abs(self.points[None] - coarse.points[:, None]).max(-1)
+        if apart.min(1).max() > 1e-6:
+            raise ValueError(f"a scan each {self.spacing} m lacks points of one each {coarse.spacing} m")
+        return apart.argmin(1)
+
+    def _per_number(self, values: list[tuple[float, ...]]) -> np.ndarray:
+        parts = [np.broadcast_to(v, term.size) for v, term in zip(values, self.table, strict=True)]
+        return np.concatenate(parts).astype(np.float32)
 
 
-SCALE = _per_number([term.scale for term in TABLE])
-"""(235,) factor of every number."""
+SCANS = {spacing: HeightScan(spacing) for spacing in (0.1, 0.05)}
+"""The scans that there are, by their spacing [m]: the published one [ViNL config], and one as fine as the ground's
+cells."""
 
-NOISE = SCALE * _per_number([(term.noise,) for term in TABLE])
-"""(235,) half-width of the training noise of every number, after scaling."""
+STANDARD_SCAN = SCANS[0.1]
+SCAN_POINTS, TABLE = STANDARD_SCAN.points, STANDARD_SCAN.table
+SCAN_SIZE, OBSERVATION_SIZE = STANDARD_SCAN.size, STANDARD_SCAN.observation_size
+SCALE, NOISE = STANDARD_SCAN.scale, STANDARD_SCAN.noise
+
+
+def find_scan(observation_size: int) -> HeightScan | None:
+    """The scan that an observation of so many numbers ends with; None: no observation with a scan has so many."""
+    return next((scan for scan in SCANS.values() if scan.observation_size == observation_size), None)
 
 
 def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, ground: Any) -> Any:
@@ -80,11 +134,17 @@ def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, g
             (MuJoCo's convention for a free joint).
         command: (n, 3) forward [m/s], left [m/s], yaw rate [rad/s].
         previous_action: (n, 12) the network's last output.
-        ground: (n, 187) height of the ground under the scan points [m].
+        ground: (n, k) height of the ground under the k points of a scan of ``SCANS`` [m].
 
     Returns:
-        (n, 235) in the order of ``TABLE``.
+        (n, 48 + k) in the order of that scan's table.
+
+    Raises:
+        ValueError: no scan has k points.
     """
+    scan = find_scan(PROPRIOCEPTION_SIZE + ground.shape[-1])
+    if scan is None:
+        raise ValueError(f"no height scan has {ground.shape[-1]} points")
     quaternion = qpos[:, 3:7]
     down = xp.broadcast_to(xp.asarray([0.0, 0.0, -1.0], dtype=qpos.dtype), qpos[:, :3].shape)
     parts = [
@@ -97,9 +157,11 @@ def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, g
         previous_action,
         xp.clip(qpos[:, 2:3] - SCAN_OFFSET - ground, -1.0, 1.0),
     ]
-    return xp.clip(xp.concatenate(parts, -1) * xp.asarray(SCALE, dtype=qpos.dtype), -CLIP, CLIP)
+    return xp.clip(xp.concatenate(parts, -1) * xp.asarray(scan.scale, dtype=qpos.dtype), -CLIP, CLIP)
 
 
-def describe() -> list[dict[str, Any]]:
+def describe(scan: HeightScan = STANDARD_SCAN) -> list[dict[str, Any]]:
     """The table as plain data, for policy cards and the docs."""
-    return [{"name": t.name, "size": t.size, "scale": list(t.scale), "noise": t.noise, "unit": t.unit} for t in TABLE]
+    return [
+        {"name": t.name, "size": t.size, "scale": list(t.scale), "noise": t.noise, "unit": t.unit} for t in scan.table
+    ]

@@ -1,18 +1,18 @@
-"""The height scan: what the ground's height is under 187 points around the robot, for numpy and jax.numpy alike."""
+"""The height scan: what the ground's height is under points around the robot, for numpy and jax.numpy alike."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from vinl.robot.observation import SCAN_POINTS
+from vinl.robot.observation import STANDARD_SCAN, HeightScan
 from vinl.robot.rotation import yaw_of
 from vinl.world.grid import GridFrame
 
 
-def scan_ground(xp: Any, heights: Any, frame: GridFrame, qpos: Any) -> Any:
+def scan_ground(xp: Any, heights: Any, frame: GridFrame, qpos: Any, scan: HeightScan = STANDARD_SCAN) -> Any:
     """Height of the ground under every scan point, read from the nearest cell of a grid.
 
-    The points of ``SCAN_POINTS`` are turned by the trunk's heading (not by its roll and pitch) and moved to the trunk.
+    The points of the scan are turned by the trunk's heading (not by its roll and pitch) and moved to the trunk.
     A point outside the grid reads the grid's nearest edge cell. The frame is static, so under ``jax.jit`` the whole
     scan is one gather from a flat array.
 
@@ -21,9 +21,10 @@ def scan_ground(xp: Any, heights: Any, frame: GridFrame, qpos: Any) -> Any:
         heights: (rows * columns,) or (rows, columns), height of the ground [m], rows along y.
         frame: where the cells lie.
         qpos: (n, >= 7), trunk position [m] and unit quaternion w x y z; what follows is ignored.
+        scan: where to read.
 
     Returns:
-        (n, 187) heights [m], in the order of ``SCAN_POINTS``.
+        (n, scan.size) heights [m], in the order of ``scan.points``.
 
     Raises:
         ValueError: if the heights do not have as many cells as the frame.
@@ -32,7 +33,7 @@ def scan_ground(xp: Any, heights: Any, frame: GridFrame, qpos: Any) -> Any:
     flat = heights.reshape(-1)
     if flat.shape[0] != rows * columns:
         raise ValueError(f"heights hold {flat.shape[0]} cells, the frame has {rows} x {columns}")
-    points = xp.asarray(SCAN_POINTS / frame.resolution, dtype=qpos.dtype)
+    points = xp.asarray(scan.points / frame.resolution, dtype=qpos.dtype)
     yaw = yaw_of(xp, qpos[:, 3:7])[:, None]
     c, s = xp.cos(yaw), xp.sin(yaw)
     j = (qpos[:, 0:1] - frame.x0) / frame.resolution + c * points[:, 0] - s * points[:, 1]
