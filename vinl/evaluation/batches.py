@@ -1,4 +1,4 @@
-"""Networks asked in batches of one fixed size, so that no answer depends on who else is asked."""
+"""Networks asked in batches of safe sizes, so that no answer depends on who else is asked."""
 
 from __future__ import annotations
 
@@ -14,23 +14,19 @@ from torch import Tensor
 from vinl.evaluation.learned_navigator import LearnedNavigator
 from vinl.evaluation.navigator import Navigator
 from vinl.evaluation.oracle import OracleNavigator
+from vinl.evaluation.safe_sizes import find_safe_sizes, split_calls
 from vinl.policies.card import PolicyCard
 from vinl.policies.depth_policy import DepthNetwork, DepthPolicy, State
 from vinl.policies.policy import LocomotionPolicy, Policy
 from vinl.robot.cameras import Camera
 
-BATCH = 8
-"""Robots in one call of a network on the CPU. Libraries choose another way to add up for other sizes (with torch 2.13
-on an AVX-512 CPU the last bits differ between 1, 2, 3, 4 and 5 rows); at 8, a row's answer depended neither on its
-place nor on the other rows, see docs/evaluation.md."""
-
 
 class BatchedPolicy:
-    """A shipped kind of policy that is asked for some of its robots, always ``BATCH`` in a call.
+    """A shipped kind of policy that is asked for some of its robots, in calls of sizes that give the same bits.
 
-    A call with fewer robots is filled up with copies of the first. So the answer for a robot depends on that robot
-    alone: not on how many others walk beside it, which of them live, or which worker has it. On a GPU all are asked in
-    one call.
+    A call is filled up with copies of its first robot to the next of ``find_safe_sizes``. So the answer for a robot
+    depends on that robot alone: not on how many others walk beside it, which of them live, or which worker has it. On a
+    GPU all are asked in one call.
 
     Args:
         policy: its network is called directly; the policy's own memory stays untouched.
@@ -69,11 +65,13 @@ class BatchedPolicy:
             depth: (n, height, width) [m], if the policy has a camera.
         """
         chosen = range(len(observation)) if self.rows is None else self.rows
-        size = BATCH if self._device.type == "cpu" else max(len(chosen), 1)
+        sizes = find_safe_sizes(self._network) if self._device.type == "cpu" else (max(len(chosen), 1),)
         inputs = torch.as_tensor(np.asarray(observation, np.float32), device=self._device)
         with torch.no_grad():
-            for first in range(0, len(chosen), size):
-                asked = list(chosen[first : first + size])
+            first = 0
+            for count, size in split_calls(len(chosen), sizes):
+                asked = list(chosen[first : first + count])
+                first += count
                 some = torch.tensor(asked + asked[:1] * (size - len(asked)), device=self._device)
                 answer = self._ask(inputs[some], depth, some, len(asked))
                 self._answers[asked] = answer[: len(asked)].cpu().numpy()
