@@ -11,6 +11,7 @@ from jaxtyping import Float
 from vinl.robot.cameras import Camera
 from vinl.robot.rotation import matrix_of
 from vinl.sensing.depth import DepthCamera, Mesh
+from vinl.sensing.prepared import PreparedRender
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.mesh import BOTTOM_TRIANGLES, TOP_TRIANGLES, TRIANGLES_PER_BOX, floorplan_mesh
@@ -38,6 +39,7 @@ class Eyes:
         self._depth = DepthCamera(meshes, camera, floor=floor)
         self._mount, self._turn = np.array(camera.position), camera.rotation()
         self._worlds = np.asarray(worlds, dtype=np.int32)
+        self._renders: dict[int, PreparedRender] = {}
         self._images = torch.full((len(worlds), camera.height, camera.width), camera.far)
 
     def look(
@@ -52,13 +54,17 @@ class Eyes:
         Returns:
             (n, height, width), overwritten by the next call.
         """
-        if rows is None or len(rows) == len(self._worlds):
-            return self._depth.render_poses(self._worlds, *self._place(qpos), out=self._images)
-        if len(rows):
-            chosen = list(rows)
-            seen = self._depth.render_poses(self._worlds[chosen], *self._place(qpos[chosen]))
-            self._images[torch.as_tensor(chosen)] = seen
+        chosen = list(range(len(self._worlds)) if rows is None else rows)
+        if chosen:
+            render = self._prepare(len(chosen))
+            self._images[torch.as_tensor(chosen)] = render(self._worlds[chosen], *self._place(qpos[chosen]))
         return self._images
+
+    def _prepare(self, n: int) -> PreparedRender:
+        """The launch for so many robots, made when so many look for the first time."""
+        if n not in self._renders:
+            self._renders[n] = PreparedRender(self._depth, n)
+        return self._renders[n]
 
     def _place(self, qpos: Float[np.ndarray, "n 19"]) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3 3"]]:
         """Position and orientation of the cameras. Written out, not as matrix products: a library's product may round

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 
 def rotate_inverse(xp: Any, quaternion: Any, vector: Any) -> Any:
     """Turn world vectors into the body frame.
@@ -17,8 +19,17 @@ def rotate_inverse(xp: Any, quaternion: Any, vector: Any) -> Any:
         (..., 3), the vectors in the body frame.
     """
     w, r = quaternion[..., :1], -quaternion[..., 1:]
-    t = 2 * xp.cross(r, vector)
-    return vector + w * t + xp.cross(r, t)
+    t = 2 * _cross(xp, r, vector)
+    return vector + w * t + _cross(xp, r, t)
+
+
+def _cross(xp: Any, a: Any, b: Any) -> Any:
+    """``xp.cross``, for numpy written out: its own takes several times as long for a few robots."""
+    if xp is not np:
+        return xp.cross(a, b)
+    ax, ay, az = (a[..., k] for k in range(3))
+    bx, by, bz = (b[..., k] for k in range(3))
+    return xp.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], -1)
 
 
 def yaw_of(xp: Any, quaternion: Any) -> Any:

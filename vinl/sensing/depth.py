@@ -62,6 +62,7 @@ class DepthCamera:
             None: what there is of floor is in the meshes.
 
     Attributes:
+        camera, device, dtype, floor: as given.
         mesh_ids: Warp's handles of the meshes, world by world, for kernels of one's own.
 
     Raises:
@@ -80,7 +81,7 @@ class DepthCamera:
             raise InputError("a depth camera needs at least one mesh to look at")
         if dtype not in (torch.float16, torch.float32):
             raise InputError(f"depth is float32 or float16, not {dtype}")
-        self.camera, self._floor = camera, floor
+        self.camera, self.floor = camera, floor
         self.device = check_device(device)
         self.dtype = dtype
         self._warp_device = str(self.device)
@@ -151,7 +152,7 @@ class DepthCamera:
         if n == 0:
             return out
         wp.launch(
-            render_depth if self._floor is None else render_depth_over_floor,
+            render_depth if self.floor is None else render_depth_over_floor,
             dim=shape,
             inputs=[
                 self.mesh_ids,
@@ -160,7 +161,7 @@ class DepthCamera:
                 wp.from_torch(rotation.contiguous(), dtype=wp.mat33),
                 wp.from_torch(tan_half.contiguous(), dtype=wp.vec2),
                 self.camera.far,
-                *(() if self._floor is None else (self._floor,)),
+                *(() if self.floor is None else (self.floor,)),
             ],
             outputs=[wp.from_torch(out)],
             device=self._warp_device,
