@@ -101,12 +101,12 @@ def is_steady(policy: Any) -> bool:
 
 
 def batch_policy(policy: Policy) -> Policy:
-    """The policy in fixed batches if it is of a shipped kind, otherwise as it is."""
+    """The policy in safe batches if it is of a shipped kind, otherwise as it is."""
     return BatchedPolicy(cast(DepthPolicy, policy)) if is_steady(policy) else policy
 
 
 def batch_navigator(navigator: Navigator) -> Navigator:
-    """The navigator, its policy in fixed batches if it is a learned one of a shipped kind."""
+    """The navigator, its policy in safe batches if it is a learned one of a shipped kind."""
     if not is_steady_navigator(navigator) or not isinstance(navigator, LearnedNavigator):
         return navigator
     seated = copy.copy(navigator)

@@ -48,10 +48,10 @@ def run_episodes(
 ) -> list[Episode]:
     """Run episodes of one plan in lockstep.
 
-    An episode gives the same numbers whichever others it is run with: shipped kinds of policies are asked in batches of
-    a fixed size, for those that still live (``batches``). Policies and navigators of one's own are always asked for all
-    rows, those of finished episodes too; they are then the same as long as they are run with the same others.
-    Images are rendered for the living alone; the others keep their last one.
+    An episode gives the same numbers whichever others it is run with: shipped kinds of policies are asked in calls of
+    sizes that give the same bits, for those that still live (``batches``). Policies and navigators of one's own are
+    always asked for all rows, those of finished episodes too; they are then the same as long as they are run with the
+    same others. Images are rendered for the living alone; the others keep their last one.
 
     Args:
         plan: the floor plan.

@@ -23,7 +23,7 @@ from vinl.world.start_goal import StartGoal
 T = TypeVar("T")
 
 LARGEST = 24
-"""Episodes in a piece of work at most: three batches of the networks; the robots of more would wait for each other."""
+"""Episodes in a piece of work at most: as many as one call of a network holds; the robots of more would wait for each other."""
 
 _PIECES = 3
 """So many pieces of work for each worker, so that none is idle for long at the end."""
@@ -85,7 +85,7 @@ def cut_jobs(
     """The pieces of work of a row.
 
     Where an episode does not depend on those that it is run with, pieces are as large as the number of workers allows,
-    and hold episodes whose ways are about as long: a network is asked for as many robots when few of them still walk.
+    and hold episodes whose ways are about as long: one robot alone costs more than its share in a full call.
     With a policy of one's own they are all episodes of a plan and a seed, whatever is missing of them.
     """
     steady = is_steady(who.locomotor) and is_steady_navigator(who.navigator)
