@@ -12,7 +12,6 @@ from vinl.world.blocks import Blocks
 from vinl.world.mesh import floorplan_mesh
 from vinl.world.readers import load_floorplans
 
-
 PLANS = load_floorplans(["harbour_flat", "mill_loft"])
 MESHES = [floorplan_mesh(plan, Blocks.empty()) for plan in PLANS]
 

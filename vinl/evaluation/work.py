@@ -23,7 +23,7 @@ from vinl.world.start_goal import StartGoal
 T = TypeVar("T")
 
 LARGEST = 24
-"""Episodes in a piece of work at most: as many as one call of a network holds; the robots of more would wait for each other."""
+"""Episodes in a piece of work at most: as many as one call of a network holds. More would wait for each other."""
 
 _PIECES = 3
 """So many pieces of work for each worker, so that none is idle for long at the end."""
