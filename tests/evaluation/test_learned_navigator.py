@@ -15,6 +15,7 @@ from vinl.evaluation.config import EvaluationConfig
 from vinl.evaluation.evaluate import evaluate
 from vinl.evaluation.learned_navigator import LearnedNavigator
 from vinl.evaluation.navigator import Task, load_navigator
+from vinl.evaluation.safe_sizes import find_safe_sizes
 from vinl.policies.card import locomotion_card, navigation_card
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy, save_policy
@@ -81,6 +82,8 @@ def test_scripted_navigator_walks_an_episode(two_rooms: FloorPlan) -> None:
     """The shipped locomotor, steered by a network that heads straight for the goal; images at 2 Hz."""
     config = EvaluationConfig(time_limit=30.0, min_distance=2.0, success_radius=1.0)
     policy = make_guide()
+    find_safe_sizes(policy.network)  # tried once, before the walk
+    policy.network.seen.clear()  # type: ignore[operator, union-attr]
     results = evaluate([two_rooms], "rough", LearnedNavigator(policy), episodes=1, seeds=1, config=config)
     record = results.records[0]
     assert record.success and record.distance_m > 0.9 * (record.straight_m - 1.0)
