@@ -27,7 +27,11 @@ def draw_commands(config: CommandConfig, u: Float[Array, "n 5"]) -> tuple[Float[
     Returns:
         (n, 3) forward, left [m/s] and yaw rate [rad/s]; (n,) control steps until the next command.
     """
-    plane = jnp.stack([between(config.forward, u[:, 0]), between(config.left, u[:, 1])], 1)
+    forward = between(config.forward, u[:, 0])
+    if config.back_share > 0:  # the same draw decides what a command is: standing, turning, or leading back come first
+        upto = config.stand_share + config.turn_share + config.back_share
+        forward = jnp.where(u[:, 4] < upto, between(config.back, u[:, 0]), forward)
+    plane = jnp.stack([forward, between(config.left, u[:, 1])], 1)
     plane = jnp.where(jnp.linalg.norm(plane, axis=1, keepdims=True) > config.min_speed, plane, 0.0)
     turn = between(config.yaw_rate, u[:, 2:3])
     stand = u[:, 4:5] < config.stand_share

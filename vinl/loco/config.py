@@ -30,6 +30,8 @@ class CommandConfig:
         min_speed: slower linear commands become zero [m/s] [legged_gym: 0.2].
         stand_share: share of commands that are zero.
         turn_share: share of commands that only turn on the spot.
+        back: range of the forward velocity of commands that lead backwards [m/s].
+        back_share: share of these commands; all others are drawn from ``forward``.
     """
 
     forward: Range = (-1.0, 1.0)
@@ -39,14 +41,17 @@ class CommandConfig:
     min_speed: float = 0.2
     stand_share: float = 0.05
     turn_share: float = 0.1
+    back: Range = (-0.4, -0.2)
+    back_share: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("forward", "left", "yaw_rate", "hold"):
+        for name in ("forward", "left", "yaw_rate", "hold", "back"):
             _check_range(f"commands.{name}", getattr(self, name))
         if self.hold[0] <= 0:
             raise InputError(f"commands.hold must be positive, got {self.hold[0]}")
-        if not 0 <= self.stand_share + self.turn_share <= 1:
-            raise InputError("commands.stand_share and turn_share must be shares that add up to at most 1")
+        shares = self.stand_share, self.turn_share, self.back_share
+        if min(shares) < 0 or sum(shares) > 1:
+            raise InputError("commands: stand_share, turn_share and back_share must be shares that add up to at most 1")
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
+from vinl.world.hurdles import draw_hurdles
 from vinl.world.joined import draw_rows, join_blocks, joined_share
 from vinl.world.rooms_tile import draw_rooms
 
@@ -37,7 +38,7 @@ class TerrainConfig:
     """Which tiles lie where. Levels run along x, columns along y; every column holds one type.
 
     Attributes:
-        slope, rough_slope, stairs_up, stairs_down, discrete, walls, blocks, rooms: share of the columns of each type.
+        slope, rough_slope, stairs_up, stairs_down, discrete, walls, blocks, rooms, hurdles: shares of the columns.
         levels: rows of rising difficulty; difficulty of level k is k / levels, 0 to 0.9 for ten [ViNL code].
         columns: columns of tiles.
         seed: of everything random in the tiles.
@@ -62,6 +63,7 @@ class TerrainConfig:
     walls: float = 0.0
     blocks: float = 0.0
     rooms: float = 0.0
+    hurdles: float = 0.0
     levels: int = 10
     columns: int = 20
     seed: int = 0
@@ -97,8 +99,8 @@ class TerrainConfig:
 
     def shares(self) -> dict[str, float]:
         """Share of every tile type, in the order of the columns."""
-        names = ("slope", "rough_slope", "stairs_up", "stairs_down", "discrete", "walls", "blocks", "rooms")
-        return {name: getattr(self, name) for name in names}
+        flat = ("slope", "rough_slope", "stairs_up", "stairs_down", "discrete")
+        return {name: getattr(self, name) for name in (*flat, "walls", "blocks", "rooms", "hurdles")}
 
     def heights_at(self, level: int) -> tuple[float, float]:
         """Range of the blocks' heights on a level [m]."""
@@ -235,7 +237,11 @@ def build_terrain(config: TerrainConfig) -> Terrain:
                 ground.heights[i : i + CELLS, j : j + CELLS] = tiles[kind]()
                 continue
             none = np.zeros((0, 2))
-            if kind == "rooms":
+            if kind == "hurdles":
+                if k > 0:
+                    rings = draw_hurdles(rng, TILE, config.start_clear, config.heights_at(k)).rows
+                    blocks.append(Blocks(rings + shift[:6]))
+            elif kind == "rooms":
                 tall.append(Boxes(draw_rooms(rng, TILE, difficulty, config.alleys).rows + shift))
                 if config.wall_blocks > 0:
                     blocks.append(_tile_blocks(config, rng, k, middle, none, config.wall_blocks))
