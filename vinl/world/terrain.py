@@ -16,7 +16,7 @@ from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
 from vinl.world.hurdles import draw_hurdles
 from vinl.world.joined import draw_rows, join_blocks, joined_share
-from vinl.world.rooms_tile import draw_rooms
+from vinl.world.rooms_tile import block_doors, draw_rooms
 
 RESOLUTION = 0.05
 """Pitch of the height field [m]."""
@@ -49,6 +49,7 @@ class TerrainConfig:
         joined: share of the blocks that touch or overlap another: end to end, at an angle or side by side.
         wall_blocks: blocks on ``walls`` and ``rooms`` tiles, as a share of those on ``blocks`` tiles.
         alleys: share of the spaces between the walls of ``rooms`` tiles that are alleys of 0.5-0.8 m.
+        door_blocks: share of the doorways of ``rooms`` tiles beyond the first level with a block across.
         row_density: rows of blocks per m2 on ``blocks`` tiles beyond the first level, the same on all of these.
         row_length: range of their lengths [m].
         first_height: range of the blocks' heights on the first level [m], from which they grow evenly to
@@ -74,6 +75,7 @@ class TerrainConfig:
     joined: float = 0.0
     wall_blocks: float = 0.0
     alleys: float = 0.0
+    door_blocks: float = 0.0
     row_density: float = 0.0
     row_length: tuple[float, float] = (0.8, 2.0)
     first_height: tuple[float, float] | None = None
@@ -92,8 +94,8 @@ class TerrainConfig:
             raise InputError(f"terrain: row_length must be a rising positive range, got {self.row_length}")
         if min(self.block_density, self.tall_density, self.row_density) < 0:
             raise InputError("terrain: densities must not be negative")
-        if not all(0 <= share <= 1 for share in (self.joined, self.wall_blocks, self.alleys)):
-            raise InputError("terrain: joined, wall_blocks and alleys must lie in [0, 1]")
+        if not all(0 <= share <= 1 for share in (self.joined, self.wall_blocks, self.alleys, self.door_blocks)):
+            raise InputError("terrain: joined, wall_blocks, alleys and door_blocks must lie in [0, 1]")
         if self.start_clear < 0:
             raise InputError("terrain: start_clear must not be negative")
 
@@ -242,9 +244,14 @@ def build_terrain(config: TerrainConfig) -> Terrain:
                     rings = draw_hurdles(rng, TILE, config.start_clear, config.heights_at(k)).rows
                     blocks.append(Blocks(rings + shift[:6]))
             elif kind == "rooms":
-                tall.append(Boxes(draw_rooms(rng, TILE, difficulty, config.alleys).rows + shift))
+                rooms = draw_rooms(rng, TILE, difficulty, config.alleys)
+                tall.append(Boxes(rooms.walls.rows + shift))
                 if config.wall_blocks > 0:
                     blocks.append(_tile_blocks(config, rng, k, middle, none, config.wall_blocks))
+                if config.door_blocks > 0 and k > 0:
+                    across = block_doors(rng, rooms.doors, config.door_blocks, config.heights_at(k))
+                    kept = across.rows[across.boxes().distances(_START)[:, 0] > config.start_clear]
+                    blocks.append(Blocks(kept + shift[:6]))
             elif kind == "walls":
                 count = round(difficulty * 0.15 * TILE**2)
                 here = scatter_centres(rng, count, TILE / 2 - 0.3, 1.0, 1.2, none)
