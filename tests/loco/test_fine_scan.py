@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import torch
+from small_tiles import BLOCK_TILES, SMALL_STUDENT
 from torch.nn.functional import linear
 
 from vinl.cli.app import main
@@ -30,26 +31,13 @@ FINE = SCANS[0.05]
 SMALL = [
     "scan_spacing=0.05",
     "num_envs=16",
-    "iterations=3",
-    "terrain.levels=2",
-    "terrain.columns=2",
-    "terrain.blocks=1",
-    "terrain.walls=0",
-    "terrain.rough_slope=0",
-    "terrain.discrete=0",
+    *BLOCK_TILES,
     "terrain.joined=0",
     "terrain.tall_density=0",
     "terrain.row_density=0",
 ]
 PPO = ["ppo.steps=4", "ppo.critic_warmup=1"]
-STUDENT = [
-    "student.camera.width=32",
-    "student.camera.height=18",
-    "student.network.hidden=16",
-    "student.distillation.steps=4",
-    "student.distillation.bptt=2",
-    "student.distillation.minibatches=2",
-]
+STUDENT = [*SMALL_STUDENT, "student.network.hidden=16"]
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import torch
+from small_tiles import BLOCK_TILES
 
 from vinl.cli.app import main
 from vinl.config.loader import load_config
@@ -18,21 +19,7 @@ from vinl.loco.replay import LostState, load_lost, replay
 from vinl.rl.not_finite import NotFiniteError, judge_losses
 from vinl.rl.run_folder import MAX_LOST, RunFolder
 
-STAGE2 = [
-    "num_envs=8",
-    "ppo.steps=4",
-    "ppo.critic_warmup=1",
-    "terrain.levels=2",
-    "terrain.columns=2",
-    "terrain.blocks=1",
-]
-STAGE2 += [
-    "terrain.walls=0",
-    "terrain.rough_slope=0",
-    "terrain.discrete=0",
-    "terrain.block_density=0.1",
-    "iterations=3",
-]
+STAGE2 = ["num_envs=8", *BLOCK_TILES, "ppo.steps=4", "ppo.critic_warmup=1", "terrain.block_density=0.1"]
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 import torch
+from small_tiles import BLOCK_TILES
 from tensordict import TensorDict
 
 from vinl.cli.app import main
@@ -32,15 +33,9 @@ from vinl.world.terrain import TILE, build_terrain
 
 SMALL = [
     "num_envs=16",
-    "iterations=3",
+    *BLOCK_TILES,
     "ppo.steps=4",
     "ppo.critic_warmup=1",
-    "terrain.levels=2",
-    "terrain.columns=2",
-    "terrain.blocks=1",
-    "terrain.walls=0",
-    "terrain.rough_slope=0",
-    "terrain.discrete=0",
     "terrain.joined=0",
     "terrain.tall_density=0",
     "terrain.block_density=0.1",

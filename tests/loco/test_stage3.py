@@ -9,6 +9,7 @@ import jax
 import numpy as np
 import pytest
 import torch
+from small_tiles import BLOCK_TILES, SMALL_STUDENT
 from tensordict import TensorDict
 
 from vinl.cli.app import main
@@ -26,21 +27,7 @@ from vinl.policies.networks import BlindActor, MapActor
 from vinl.rl.stopwatch import Stopwatch
 from vinl.robot.observation import OBSERVATION_SIZE
 
-SMALL = [
-    "num_envs=16",
-    "iterations=3",
-    "terrain.levels=2",
-    "terrain.columns=2",
-    "terrain.blocks=1",
-    "terrain.walls=0",
-    "terrain.rough_slope=0",
-    "terrain.discrete=0",
-    "student.camera.width=32",
-    "student.camera.height=18",
-    "student.distillation.steps=4",
-    "student.distillation.bptt=2",
-    "student.distillation.minibatches=2",
-]
+SMALL = ["num_envs=16", *BLOCK_TILES, *SMALL_STUDENT]
 
 
 @pytest.fixture(scope="module")
