@@ -62,7 +62,7 @@ class DepthCamera:
             None: what there is of floor is in the meshes.
 
     Attributes:
-        camera, device, dtype, floor: as given.
+        camera, device, dtype: as given.
         mesh_ids: Warp's handles of the meshes, world by world, for kernels of one's own.
 
     Raises:
@@ -81,7 +81,7 @@ class DepthCamera:
             raise InputError("a depth camera needs at least one mesh to look at")
         if dtype not in (torch.float16, torch.float32):
             raise InputError(f"depth is float32 or float16, not {dtype}")
-        self.camera, self.floor = camera, floor
+        self.camera, self._floor = camera, floor
         self.device = check_device(device)
         self.dtype = dtype
         self._warp_device = str(self.device)
@@ -151,23 +151,32 @@ class DepthCamera:
             raise InputError(f"out needs shape {shape}, {self.dtype}, {self.device}, contiguous")
         if n == 0:
             return out
-        wp.launch(
-            render_depth if self.floor is None else render_depth_over_floor,
-            dim=shape,
-            inputs=[
-                self.mesh_ids,
-                wp.from_torch(self._world(world), dtype=wp.int32),
-                wp.from_torch(position.contiguous(), dtype=wp.vec3),
-                wp.from_torch(rotation.contiguous(), dtype=wp.mat33),
-                wp.from_torch(tan_half.contiguous(), dtype=wp.vec2),
-                self.camera.far,
-                *(() if self.floor is None else (self.floor,)),
-            ],
-            outputs=[wp.from_torch(out)],
-            device=self._warp_device,
-            stream=self._stream(),
+        self.launch(
+            wp.from_torch(self._world(world), dtype=wp.int32),
+            wp.from_torch(position.contiguous(), dtype=wp.vec3),
+            wp.from_torch(rotation.contiguous(), dtype=wp.mat33),
+            wp.from_torch(tan_half.contiguous(), dtype=wp.vec2),
+            wp.from_torch(out),
         )
         return out
+
+    def launch(
+        self, world: wp.array, position: wp.array, rotation: wp.array, tan_half: wp.array, out: wp.array, **options: Any
+    ) -> Any:
+        """Launch the kernel on Warp's arrays as in ``render_poses``, unchecked; ``options`` of ``wp.launch``."""
+        over_floor = self._floor is not None
+        return wp.launch(
+            render_depth_over_floor if over_floor else render_depth,
+            dim=out.shape,
+            inputs=[
+                *(self.mesh_ids, world, position, rotation, tan_half, self.camera.far),
+                *((self._floor,) if over_floor else ()),
+            ],
+            outputs=[out],
+            device=self._warp_device,
+            stream=self._stream(),
+            **options,
+        )
 
     def _stream(self) -> wp.Stream | None:
         if self.device.type == "cpu":

@@ -11,7 +11,6 @@ import warp as wp
 from jaxtyping import Float
 
 from vinl.sensing.depth import DepthCamera
-from vinl.sensing.kernels import render_depth, render_depth_over_floor
 
 
 class PreparedRender:
@@ -28,26 +27,18 @@ class PreparedRender:
         if depth.device.type != "cpu" or depth.dtype != torch.float32:
             raise ValueError(f"renders float32 on the CPU are prepared, not {depth.dtype} on {depth.device}")
         self._depth = depth  # its meshes must live as long as the launch
-        camera, floor = depth.camera, depth.floor
+        camera = depth.camera
         self._world, self._position = np.zeros(n, np.int32), np.zeros((n, 3), np.float32)
         self._rotation = np.zeros((n, 3, 3), np.float32)
         self._tan_half = np.tile(np.array(camera.tan_half, np.float32), (n, 1))
         self._images = np.zeros((n, camera.height, camera.width), np.float32)
         self._answer = torch.from_numpy(self._images)
-        self._launch: Any = wp.launch(
-            render_depth if floor is None else render_depth_over_floor,
-            dim=self._images.shape,
-            inputs=[
-                depth.mesh_ids,
-                _share(self._world, wp.int32),
-                _share(self._position, wp.vec3),
-                _share(self._rotation, wp.mat33),
-                _share(self._tan_half, wp.vec2),
-                camera.far,
-                *(() if floor is None else (floor,)),
-            ],
-            outputs=[_share(self._images, wp.float32)],
-            device="cpu",
+        self._launch: Any = depth.launch(
+            _share(self._world, wp.int32),
+            _share(self._position, wp.vec3),
+            _share(self._rotation, wp.mat33),
+            _share(self._tan_half, wp.vec2),
+            _share(self._images, wp.float32),
             record_cmd=True,
         )
 

@@ -7,7 +7,7 @@ import numpy as np
 from vinl.world.blocks import Blocks
 
 _PITCH = (0.7, 1.4)
-"""Distances from ring to ring [m]: a robot 0.65 m long has all its feet between two of them, or not."""
+"""Distances from ring to ring [m]: a robot 0.65 m long can just stand between two, or stride over one at a time."""
 
 _DEPTH = 0.2
 """Of a block [m] [paper IV-A]."""

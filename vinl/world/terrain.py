@@ -250,8 +250,7 @@ def build_terrain(config: TerrainConfig) -> Terrain:
                     blocks.append(_tile_blocks(config, rng, k, middle, none, config.wall_blocks))
                 if config.door_blocks > 0 and k > 0:
                     across = block_doors(rng, rooms.doors, config.door_blocks, config.heights_at(k))
-                    kept = across.rows[across.boxes().distances(_START)[:, 0] > config.start_clear]
-                    blocks.append(Blocks(kept + shift[:6]))
+                    blocks.append(Blocks(_clear_start(across, config.start_clear).rows + shift[:6]))
             elif kind == "walls":
                 count = round(difficulty * 0.15 * TILE**2)
                 here = scatter_centres(rng, count, TILE / 2 - 0.3, 1.0, 1.2, none)
@@ -298,8 +297,13 @@ def _tile_blocks(
         count = round(config.row_density * TILE**2)
         here = scatter_centres(rng, count, TILE / 2 - 0.3, config.start_clear, 1.0, np.zeros((0, 2)))
         rows = draw_rows(rng, here, config.row_length, heights)
-        blocks += Blocks(rows.rows[rows.boxes().distances(_START)[:, 0] > config.start_clear])
+        blocks += _clear_start(rows, config.start_clear)
     return Blocks(blocks.rows + np.array([*middle, 0, 0, 0, 0]))
+
+
+def _clear_start(blocks: Blocks, clear: float) -> Blocks:
+    """The blocks of a tile that leave a disc around its middle free [m]."""
+    return Blocks(blocks.rows[blocks.boxes().distances(_START)[:, 0] > clear])
 
 
 def _off_the_start(boxes: Boxes) -> Boxes:
