@@ -122,7 +122,7 @@ def test_policies_that_cannot_teach_are_refused(tmp_path, capsys):
     save_policy(blind, network, locomotion_card("blind", network.describe()))
     eyes = stage3.build_student(StudentConfig(), MapActor())
     camera = StudentConfig().camera.record().describe()
-    save_policy(student, eyes, locomotion_card("student", eyes.describe(), scan=False, camera=camera))
+    save_policy(student, eyes, locomotion_card("student", eyes.describe(), scan=None, camera=camera))
     for folder, words in ((blind, "without a map"), (student, "a student itself"), (tmp_path / "none", "unknown")):
         command = ["train-loco", "--stage", "3", "--device", "cpu", "--from", str(folder), "--out", "out"]
         assert main(command) == 2

@@ -45,7 +45,7 @@ class CountingEye(PolicyNetwork):
 
 @pytest.fixture
 def card() -> PolicyCard:
-    return locomotion_card("eye", CountingEye().describe(), scan=False, camera=CAMERA.describe())
+    return locomotion_card("eye", CountingEye().describe(), scan=None, camera=CAMERA.describe())
 
 
 def observe(n: int) -> tuple[np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from vinl.robot.observation import (
     SCANS,
     STANDARD_SCAN,
     TABLE,
+    HeightScan,
     describe,
     find_scan,
     observe,
@@ -56,18 +57,27 @@ def test_scan_points():
     assert np.allclose(SCAN_POINTS[1], [-0.8, -0.4]) and np.allclose(SCAN_POINTS[93], 0.0)
 
 
-def test_the_fine_scan_contains_the_standard_one():
-    fine = SCANS[0.05]
-    assert fine.points.shape == (693, 2) and fine.observation_size == 741
-    assert (fine.points[fine.places_of(STANDARD_SCAN)] == SCAN_POINTS).all()  # to the last bit: the same cells
-    assert len(np.unique(fine.points.round(6), axis=0)) == 693
-    assert (np.abs(fine.points).max(0) == np.abs(SCAN_POINTS).max(0)).all()
-    assert (fine.scale[:235] == SCALE).all() and (fine.scale[48:] == 5.0).all()
-    assert (fine.noise[:235] == NOISE).all() and (fine.noise[48:] == np.float32(0.5)).all()
-    assert describe(fine)[-1] == {**describe()[-1], "size": 693}
-    assert [find_scan(n) for n in (48, 235, 741, 300)] == [None, STANDARD_SCAN, fine, None]
+@pytest.mark.parametrize(("spacing", "ahead", "size"), [(0.05, 0.8, 693), (0.1, 1.6, 275), (0.05, 1.6, 1029)])
+def test_every_other_scan_contains_the_standard_one(spacing: float, ahead: float, size: int):
+    scan = HeightScan(spacing, ahead)
+    assert scan.points.shape == (size, 2) and scan.observation_size == 48 + size
+    assert (scan.points[scan.places_of(STANDARD_SCAN)] == SCAN_POINTS).all()  # to the last bit: the same cells
+    assert len(np.unique(scan.points.round(6), axis=0)) == size
+    assert np.allclose(scan.points.min(0), SCAN_POINTS.min(0)) and np.allclose(scan.points.max(0), [ahead, 0.5])
+    assert np.isclose(scan.reach, np.hypot(ahead, 0.5))
+    assert (scan.scale[:235] == SCALE).all() and (scan.scale[48:] == 5.0).all()
+    assert (scan.noise[:235] == NOISE).all() and (scan.noise[48:] == np.float32(0.5)).all()
+    assert describe(scan)[-1] == {**describe()[-1], "size": size}
+    assert find_scan(48 + size) == scan
+    assert scan.covers(STANDARD_SCAN) and not STANDARD_SCAN.covers(scan)
     with pytest.raises(ValueError, match=r"lacks points"):
-        STANDARD_SCAN.places_of(fine)
+        STANDARD_SCAN.places_of(scan)
+
+
+def test_scans_are_told_apart_by_their_size():
+    assert len({scan.size for scan in SCANS}) == len(SCANS) == 4
+    assert [find_scan(n) for n in (48, 235, 300)] == [None, STANDARD_SCAN, None]
+    assert not HeightScan(0.1, 1.6).covers(HeightScan(0.05)) and not HeightScan(0.05).covers(HeightScan(0.1, 1.6))
 
 
 def test_the_ground_must_be_that_of_a_scan():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from vinl.robot.aliengo import home_qpos
-from vinl.robot.observation import SCAN_POINTS, SCANS, STANDARD_SCAN
+from vinl.robot.observation import SCAN_POINTS, SCANS, STANDARD_SCAN, HeightScan
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.grid import GridFrame
 
@@ -57,10 +57,11 @@ def test_off_the_grid_reads_the_edge():
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_the_fine_scan_reads_what_the_standard_one_reads(dtype: type):
-    heights, qpos, fine = np.random.default_rng(0).random(FRAME.shape), poses(50).astype(dtype), SCANS[0.05]
-    scan = scan_ground(np, heights, FRAME, qpos, fine)
-    assert (scan[:, fine.places_of(STANDARD_SCAN)] == scan_ground(np, heights, FRAME, qpos)).all()
+@pytest.mark.parametrize("other", SCANS[1:], ids=str)
+def test_other_scans_read_what_the_standard_one_reads(other: HeightScan, dtype: type):
+    heights, qpos = np.random.default_rng(0).random(FRAME.shape), poses(50).astype(dtype)
+    scan = scan_ground(np, heights, FRAME, qpos, other)
+    assert (scan[:, other.places_of(STANDARD_SCAN)] == scan_ground(np, heights, FRAME, qpos)).all()
 
 
 def test_heights_must_fit_the_frame():

@@ -14,13 +14,13 @@ from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
 
-_RIM = 1.0
-"""Level ground around every grid [m]. A scan reaches 0.94 m, so that none reads a neighbour's grid."""
 
+def rasterise_plan(plan: FloorPlan, scan: HeightScan = STANDARD_SCAN) -> HeightField:
+    """Walls and furniture as heights on the plan's grid; what hangs above the robot leaves the floor free.
 
-def rasterise_plan(plan: FloorPlan) -> HeightField:
-    """Walls and furniture as heights on the plan's grid; what hangs above the robot leaves the floor free."""
-    rim = int(np.ceil(_RIM / plan.frame.resolution))
+    Level ground lies around them, as wide as the scan reaches: none reads a neighbour's grid.
+    """
+    rim = int(np.ceil(scan.reach / plan.frame.resolution)) + 1
     shape = (plan.frame.shape[0] + 2 * rim, plan.frame.shape[1] + 2 * rim)
     r = plan.frame.resolution
     field = flat_field(GridFrame(plan.frame.x0 - rim * r, plan.frame.y0 - rim * r, r, shape))
@@ -44,7 +44,7 @@ class GroundScan:
 
     def __init__(self, plan: FloorPlan, blocks: Sequence[Blocks], scan: HeightScan = STANDARD_SCAN) -> None:
         self._scan = scan
-        bare = rasterise_plan(plan)
+        bare = rasterise_plan(plan, scan)
         rows, columns = bare.frame.shape
         if any(len(b) for b in blocks):
             heights = np.empty((len(blocks), rows, columns), np.float32)

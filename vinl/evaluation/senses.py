@@ -25,8 +25,8 @@ MOUNT_REACH = 0.25
 class Senses:
     """Asks a locomotor for the next action of all robots of a unit.
 
-    A policy of 235 numbers gets the height scan, one of 741 the fine one, one of 48 only proprioception; one with a
-    camera gets depth too.
+    A policy of 48 numbers gets only proprioception, one of more that height scan of ``SCANS`` that makes up the rest;
+    one with a camera gets depth too.
 
     Args:
         locomotor: the policy.
@@ -112,7 +112,7 @@ def check_senses(policy: Policy) -> None:
     if card.kind != "locomotion":
         raise InputError(f"{card.name} is a {card.kind} policy; a locomotor (--loco, --policy) is a locomotion policy")
     if card.observation_size != PROPRIOCEPTION_SIZE and find_scan(card.observation_size) is None:
-        known = " or ".join(f"{scan.observation_size}" for scan in SCANS.values())
+        known = " or ".join(f"{scan.observation_size}" for scan in SCANS)
         raise InputError(
             f"policy {card.name} observes {card.observation_size} numbers; the robot has {PROPRIOCEPTION_SIZE}, or "
             f"{known} with the height scan"

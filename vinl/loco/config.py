@@ -8,7 +8,7 @@ from typing import Literal
 from vinl.config.errors import InputError
 from vinl.loco.student_config import StudentConfig
 from vinl.robot.aliengo import KD, KP
-from vinl.robot.observation import SCANS, HeightScan
+from vinl.robot.observation import SCANS, STANDARD_SCAN, HeightScan
 from vinl.world.terrain import TerrainConfig
 
 Range = tuple[float, float]
@@ -283,6 +283,8 @@ class LocoConfig:
         kp, kd: joint gains [N m / rad, N m s / rad].
         scan_spacing: of the points at which actor and critic read the ground, 0.1 (187 of them) or 0.05 (693: an edge
             as exactly as the ground's cells of 5 cm have it) [m].
+        scan_ahead: how far before the middle of the trunk they reach, 0.8 (half a metre before the front feet) or 1.6
+            (275 points, or 1029: a block in time to pass it without haste) [m].
         ppo, anneal: not used by stage 3.
         student: stage 3 alone.
     """
@@ -295,7 +297,8 @@ class LocoConfig:
     episode_length: float = 20.0
     kp: float = KP
     kd: float = KD
-    scan_spacing: float = 0.1
+    scan_spacing: float = STANDARD_SCAN.spacing
+    scan_ahead: float = STANDARD_SCAN.ahead
     terrain: TerrainConfig = field(default_factory=TerrainConfig)
     commands: CommandConfig = field(default_factory=CommandConfig)
     rewards: RewardConfig = field(default_factory=RewardConfig)
@@ -318,11 +321,12 @@ class LocoConfig:
             raise InputError(f"episode_length must be positive, got {self.episode_length}")
         if self.kp <= 0 or self.kd < 0:
             raise InputError("kp must be positive and kd not negative")
-        if self.scan_spacing not in SCANS:
-            known = " or ".join(f"{spacing:g}" for spacing in SCANS)
-            raise InputError(f"scan_spacing must be {known} m, got {self.scan_spacing:g}")
+        for name, value in (("spacing", self.scan_spacing), ("ahead", self.scan_ahead)):
+            known = list(dict.fromkeys(getattr(scan, name) for scan in SCANS))
+            if value not in known:
+                raise InputError(f"scan_{name} must be {' or '.join(f'{x:g}' for x in known)} m, got {value:g}")
 
     @property
     def scan(self) -> HeightScan:
-        """The height scan with that spacing."""
-        return SCANS[self.scan_spacing]
+        """The height scan with that spacing and reach."""
+        return HeightScan(self.scan_spacing, self.scan_ahead)

@@ -42,7 +42,7 @@ class StepResult(NamedTuple):
 
     Attributes:
         observation: (n, numbers) with noise, for the actor; exact: the same without, for the critic; 235 numbers, or
-            741 with the fine height scan.
+            what else the scan of the training makes of it.
         reward: (n,); done: (n,) 1 where fallen or out of time; timeout: (n,) 1 where out of time.
         pose: (n, 7) position [m] and quaternion of the trunk, which belong to the observation.
     """

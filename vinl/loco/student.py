@@ -118,7 +118,7 @@ def train_student(
             name or run.path.name,
             policy.describe(),
             action,
-            scan=False,
+            scan=None,
             camera=camera.describe() if policy.image else None,
             training={**dump_config(config), "origin": described},
             seed=config.seed,
@@ -144,4 +144,4 @@ def train_student(
 
 def _teacher_card(name: str, config: LocoConfig, network: dict[str, Any], samples: int, commit: str) -> PolicyCard:
     action = {**describe_action(), "kp": config.kp, "kd": config.kd}
-    return locomotion_card(name, network, action, spacing=config.scan_spacing, samples=samples, commit=commit)
+    return locomotion_card(name, network, action, scan=config.scan, samples=samples, commit=commit)

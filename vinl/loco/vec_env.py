@@ -19,8 +19,8 @@ memory that the other still reads."""
 
 
 class LocoVecEnv(VecEnv):
-    """Observation groups: ``policy`` (with noise) and ``critic`` (exact), both (n, 235), or (n, 741)
-    with the fine height scan.
+    """Observation groups: ``policy`` (with noise) and ``critic`` (exact), both (n, 235), or more
+    with another scan.
 
     Args:
         environment: the robots.

@@ -17,7 +17,7 @@ from vinl.policies.depth_actor import DepthActor
 from vinl.policies.io import find_policy, load_policy
 from vinl.policies.networks import BlindActor, MapActor
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
-from vinl.robot.observation import PROPRIOCEPTION_SIZE, STANDARD_SCAN, HeightScan, find_scan
+from vinl.robot.observation import PROPRIOCEPTION_SIZE, HeightScan, find_scan
 
 
 @dataclass(frozen=True)
@@ -76,11 +76,12 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
     sizes: dict[str, Any] = {"scan": config.scan.size, "actor": p.actor}
     fresh = MapActor(encoder=p.encoder, code=p.code, **sizes) if p.map else BlindActor(**sizes)
     given, wanted = network.describe(), fresh.describe()
-    if given != wanted and given != {**wanted, "scan": STANDARD_SCAN.size}:
+    read = find_scan(network.observation_size)
+    if given != wanted and (read is None or not config.scan.covers(read) or given != {**wanted, "scan": read.size}):
         raise InputError(
             f"--from {name_or_path}: its network {_list(given)} is not that of this training "
-            f"{_list(wanted)}; set scan_spacing, ppo.map, ppo.encoder, ppo.code and ppo.actor to its own, or give "
-            "another policy"
+            f"{_list(wanted)}; set scan_spacing, scan_ahead, ppo.map, ppo.encoder, ppo.code and ppo.actor to its own, "
+            "or give another policy"
         )
     check_gains(name_or_path, policy.card, config)
     actor = {name: weight.clone() for name, weight in network.state_dict().items()}
@@ -110,7 +111,7 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origi
         )
     given = find_scan(policy.card.observation_size)
     if given is None or given != config.scan:
-        own = "" if given is None else f"; set scan_spacing={given.spacing:g}"
+        own = "" if given is None else f"; set scan_spacing={given.spacing:g} scan_ahead={given.ahead:g}"
         raise InputError(
             f"--from {name_or_path}: it observes {policy.card.observation_size} numbers, this training gives "
             f"{config.scan.observation_size}{own}"
@@ -149,7 +150,7 @@ _KINDS = {
 
 
 def widen_scan(weight: Tensor, ahead: int, scan: HeightScan) -> Tensor:
-    """The first layer of a network for a finer height scan than it was trained with.
+    """The first layer of a network for a finer or farther height scan than it was trained with.
 
     The weights of each old point go to the same point. All others are zero, so that the network answers as before.
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP
-from vinl.robot.observation import SCANS, describe
+from vinl.robot.observation import STANDARD_SCAN, HeightScan, describe
 
 SCHEMA = 1
 """Version of ``card.json``."""
@@ -93,8 +93,7 @@ def locomotion_card(
     name: str,
     network: dict[str, Any],
     action: dict[str, Any] | None = None,
-    scan: bool = True,
-    spacing: float = 0.1,
+    scan: HeightScan | None = STANDARD_SCAN,
     **rest: Any,
 ) -> PolicyCard:
     """A locomotion card with this robot's observation table and, unless given, action; ``rest`` are further fields.
@@ -103,10 +102,10 @@ def locomotion_card(
         name: short name.
         network: as ``PolicyNetwork.describe`` gives it.
         action: scale, default pose and gains.
-        scan: whether it observes the height scan; a policy that sees through a camera does not.
-        spacing: of the scan's points, one of ``robot.observation.SCANS`` [m].
+        scan: the height scan that it observes, one of ``robot.observation.SCANS``; None, as for a policy that sees
+            through a camera: none.
     """
-    table = describe(SCANS[spacing])[: None if scan else -1]
+    table = describe()[:-1] if scan is None else describe(scan)
     return PolicyCard("locomotion", name, network, table, action or describe_action(), **rest)
 
 

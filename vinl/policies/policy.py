@@ -39,8 +39,8 @@ class Policy(Protocol):
 
 
 class LocomotionPolicy:
-    """Observations (n, 235), or (n, 741) with the fine height scan, to actions (n, 12) at 50 Hz, without noise, on the
-    device of its network."""
+    """Observations (n, 235), or more with another scan of ``SCANS``, to actions (n, 12) at 50 Hz, without noise, on
+    the device of its network."""
 
     camera: Camera | None = None
     """It needs no camera."""

@@ -32,7 +32,8 @@ class ObservationTerm:
 
 
 SCAN_REACH = (0.8, 0.5)
-"""Half-lengths of the rectangle about the trunk that the height scan covers, along x and y [m] [ViNL config]."""
+"""Half-lengths of the rectangle about the trunk that the published height scan covers, along x and y [m] [ViNL
+config]."""
 
 SCAN_OFFSET = 0.5
 """The scan reads trunk height minus this minus ground height, held to +-1 m [ViNL code]."""
@@ -57,16 +58,23 @@ class HeightScan:
 
     Attributes:
         spacing: of the points, along x and y [m].
+        ahead: how far the points reach before the middle of the trunk [m].
     """
 
     spacing: float
+    ahead: float = SCAN_REACH[0]
 
     @cached_property
     def points(self) -> np.ndarray:
         """(size, 2) in the heading frame [m], x outer, y inner."""
-        steps = [round(reach / self.spacing) for reach in SCAN_REACH]
-        x, y = (np.arange(-n, n + 1) * self.spacing for n in steps)
+        behind, aside, ahead = (round(reach / self.spacing) for reach in (*SCAN_REACH, self.ahead))
+        x, y = np.arange(-behind, ahead + 1) * self.spacing, np.arange(-aside, aside + 1) * self.spacing
         return np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
+
+    @property
+    def reach(self) -> float:
+        """How far the farthest point lies from the middle of the trunk [m]."""
+        return float(np.linalg.norm(self.points, axis=1).max())
 
     @property
     def size(self) -> int:
@@ -93,27 +101,33 @@ class HeightScan:
         """(observation_size,) half-width of the training noise of every number, after scaling."""
         return self.scale * self._per_number([(term.noise,) for term in self.table])
 
-    def places_of(self, coarse: HeightScan) -> np.ndarray:
-        """(coarse.size,) which of these points are those of a coarser scan, in its order.
+    def covers(self, other: HeightScan) -> bool:
+        """Whether all points of another scan are among these."""
+        return bool(self._apart_from(other).min(1).max() < 1e-6)
+
+    def places_of(self, other: HeightScan) -> np.ndarray:
+        """(other.size,) which of these points are those of another scan, in its order.
 
         Raises:
             ValueError: some of its points are not among these.
         """
-        apart = np.abs(self.points[None] - coarse.points[:, None]).max(-1)
-        if apart.min(1).max() > 1e-6:
-            raise ValueError(f"a scan each {self.spacing} m lacks points of one each {coarse.spacing} m")
-        return apart.argmin(1)
+        if not self.covers(other):
+            raise ValueError(f"{self} lacks points of {other}")
+        return self._apart_from(other).argmin(1)
+
+    def _apart_from(self, other: HeightScan) -> np.ndarray:
+        return np.abs(self.points[None] - other.points[:, None]).max(-1)
 
     def _per_number(self, values: list[tuple[float, ...]]) -> np.ndarray:
         parts = [np.broadcast_to(v, term.size) for v, term in zip(values, self.table, strict=True)]
         return np.concatenate(parts).astype(np.float32)
 
 
-SCANS = {spacing: HeightScan(spacing) for spacing in (0.1, 0.05)}
-"""The scans that there are, by their spacing [m]: the published one [ViNL config], and one as fine as the ground's
-cells."""
+SCANS = tuple(HeightScan(spacing, ahead) for ahead in (SCAN_REACH[0], 1.6) for spacing in (0.1, 0.05))
+"""The scans that there are. The first is the published one [ViNL config]; others are as fine as the ground's cells of
+5 cm, reach as far ahead as the locomotion camera sees the floor's blocks, or both."""
 
-STANDARD_SCAN = SCANS[0.1]
+STANDARD_SCAN = SCANS[0]
 SCAN_POINTS, TABLE = STANDARD_SCAN.points, STANDARD_SCAN.table
 SCAN_SIZE, OBSERVATION_SIZE = STANDARD_SCAN.size, STANDARD_SCAN.observation_size
 SCALE, NOISE = STANDARD_SCAN.scale, STANDARD_SCAN.noise
@@ -121,7 +135,7 @@ SCALE, NOISE = STANDARD_SCAN.scale, STANDARD_SCAN.noise
 
 def find_scan(observation_size: int) -> HeightScan | None:
     """The scan that an observation of so many numbers ends with; None: no observation with a scan has so many."""
-    return next((scan for scan in SCANS.values() if scan.observation_size == observation_size), None)
+    return next((scan for scan in SCANS if scan.observation_size == observation_size), None)
 
 
 def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, ground: Any) -> Any:
@@ -134,7 +148,7 @@ def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, g
             (MuJoCo's convention for a free joint).
         command: (n, 3) forward [m/s], left [m/s], yaw rate [rad/s].
         previous_action: (n, 12) the network's last output.
-        ground: (n, k) height of the ground under the k points of a scan of ``SCANS`` [m].
+        ground: (n, k) height of the ground under the k points of one of ``SCANS`` [m].
 
     Returns:
         (n, 48 + k) in the order of that scan's table.

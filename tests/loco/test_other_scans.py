@@ -1,4 +1,4 @@
-"""Points of the height scan 5 cm apart: trained with, started with from a coarser policy, evaluated, taught with."""
+"""Points 5 cm apart that reach 1.6 m ahead: trained with, started with from less, evaluated, taught with."""
 
 import json
 import shutil
@@ -22,14 +22,15 @@ from vinl.policies.card import locomotion_card
 from vinl.policies.io import find_policy, load_policy, save_policy
 from vinl.policies.networks import BlindActor, MapActor, mlp
 from vinl.robot.aliengo import home_qpos
-from vinl.robot.observation import SCANS, STANDARD_SCAN, describe, observe
+from vinl.robot.observation import STANDARD_SCAN, HeightScan, describe, observe
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.grid import GridFrame
 from vinl.world.readers import shipped_floorplans
 
-FINE = SCANS[0.05]
+SCAN = HeightScan(0.05, 1.6)
 SMALL = [
     "scan_spacing=0.05",
+    "scan_ahead=1.6",
     "num_envs=16",
     *BLOCK_TILES,
     "terrain.joined=0",
@@ -56,11 +57,15 @@ def compiled_once(env, share_environment) -> None:
     share_environment(student, env)
 
 
+def untrained(folder: Path, scan: HeightScan) -> Path:
+    """An untrained policy that reads this scan."""
+    network = MapActor(scan=scan.size)
+    return save_policy(folder / f"untrained-{scan.size}", network, locomotion_card("x", network.describe(), scan=scan))
+
+
 @pytest.fixture
-def fine(tmp_path: Path) -> Path:
-    """An untrained policy that reads the fine scan."""
-    network = MapActor(scan=FINE.size)
-    return save_policy(tmp_path / "untrained", network, locomotion_card("untrained", network.describe(), spacing=0.05))
+def other(tmp_path: Path) -> Path:
+    return untrained(tmp_path, SCAN)
 
 
 @pytest.fixture
@@ -75,13 +80,13 @@ def coarse_run(tmp_path: Path) -> Path:
 
 
 def seen_by_both(n: int = 64) -> tuple[np.ndarray, np.ndarray]:
-    """The observations of the same robots on random ground, with the standard scan and with the fine one."""
+    """The observations of the same robots on random ground, with the standard scan and with the other one."""
     rng = np.random.default_rng(0)
     frame = GridFrame(-4.0, -4.0, 0.05, (161, 161))
     heights = rng.uniform(-0.5, 0.5, frame.shape)
     qpos = np.stack([home_qpos(*rng.uniform(-2, 2, 2), yaw=rng.uniform(-3, 3)) for _ in range(n)])
     rest = rng.normal(size=(n, 18)), rng.normal(size=(n, 3)), rng.normal(size=(n, 12))
-    both = (observe(np, qpos, *rest, scan_ground(np, heights, frame, qpos, scan)) for scan in (STANDARD_SCAN, FINE))
+    both = (observe(np, qpos, *rest, scan_ground(np, heights, frame, qpos, scan)) for scan in (STANDARD_SCAN, SCAN))
     old, new = (x.astype(np.float32) for x in both)
     return old, new
 
@@ -90,12 +95,12 @@ def test_actor_and_critic_are_given_each_cell_of_the_ground(env: LocoEnvironment
     env.step(jnp.zeros((16, 12)))
     state, field = env.state, env.terrain.ground
     qpos, qvel = np.asarray(state.body.qpos), np.asarray(state.body.qvel)
-    ground = scan_ground(np, field.heights, field.frame, qpos, FINE)
+    ground = scan_ground(np, field.heights, field.frame, qpos, SCAN)
     expected = observe(np, qpos, qvel, np.asarray(state.command), np.asarray(state.action), ground)
     noisy, exact = (np.asarray(x) for x in env.observe())
     # MJX and numpy round sines differently: a point on the border of two cells may fall on either side
-    assert exact.shape == (16, 741) and np.isclose(exact, expected, atol=1e-4).mean() > 0.999
-    noise = np.abs(noisy - exact)[:, 48:] / FINE.noise[48:]
+    assert exact.shape == (16, 1077) and np.isclose(exact, expected, atol=1e-4).mean() > 0.999
+    noise = np.abs(noisy - exact)[:, 48:] / SCAN.noise[48:]
     share = env.config.randomisation.observation_noise
     assert (noise.max(0) > 0.3 * share).all() and noise.max() <= share * 1.001
 
@@ -103,7 +108,7 @@ def test_actor_and_critic_are_given_each_cell_of_the_ground(env: LocoEnvironment
 def test_a_widened_actor_acts_as_before(config: LocoConfig) -> None:
     old, new = seen_by_both()
     rough = load_policy("rough")
-    widened = MapActor(scan=FINE.size)
+    widened = MapActor(scan=SCAN.size)
     widened.load_state_dict(load_warm_start("rough", config).actor)
     with torch.no_grad():
         actions = widened(torch.from_numpy(new)).numpy()
@@ -132,8 +137,8 @@ def test_it_trains_goes_on_and_is_evaluated(tmp_path: Path, compiled_once) -> No
     rows = [json.loads(line) for line in (tmp_path / "run" / "metrics.jsonl").read_text().splitlines()]
     assert [row["iteration"] for row in rows] == [1, 2, 3]
     policy = load_policy(run)
-    assert policy.card.observation == describe(FINE) and policy.card.observation_size == 741
-    assert policy.card.training["scan_spacing"] == 0.05
+    assert policy.card.observation == describe(SCAN) and policy.card.observation_size == 1077
+    assert policy.card.training["scan_ahead"] == 1.6
     # from a fine run as it is: while the critic warms up the actor stays
     assert main([*command, "--from", run, "--out", second, "--iterations", "1"]) == 0
     again = load_policy(second).network.state_dict()
@@ -146,32 +151,39 @@ def test_it_trains_goes_on_and_is_evaluated(tmp_path: Path, compiled_once) -> No
     assert json.loads(Path("home/results.json").read_text())["aggregate"]["episodes"] == 1
 
 
-def test_a_student_learns_from_it(fine: Path, compiled_once, capsys: pytest.CaptureFixture[str]) -> None:
-    command = ["train-loco", "--stage", "3", "--device", "cpu", "--from", str(fine), *SMALL, *STUDENT]
+def test_a_student_learns_from_it(other: Path, compiled_once, capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["train-loco", "--stage", "3", "--device", "cpu", "--from", str(other), *SMALL, *STUDENT]
     assert main([*command, "--iterations", "1", "--out", "run"]) == 0
     assert load_policy("run").card.observation_size == 48
     assert main(["train-loco", "--device", "cpu", "--resume", "run", "--iterations", "2"]) == 0
     capsys.readouterr()
-    assert main([*command, "scan_spacing=0.1", "--out", "other"]) == 2
+    assert main([*command, "scan_ahead=0.8", "--out", "other"]) == 2
     error = capsys.readouterr().err
-    assert "741 numbers" in error and "scan_spacing=0.05" in error and len(error.strip().splitlines()) == 1
+    assert (
+        "1077 numbers" in error and "scan_spacing=0.05 scan_ahead=1.6" in error and len(error.strip().splitlines()) == 1
+    )
 
 
 def test_a_blind_policy_of_either_scan_is_a_policy(tmp_path: Path, config: LocoConfig) -> None:
-    blind = load_config(LocoConfig, "loco/blind", ["scan_spacing=0.05"])
+    blind = load_config(LocoConfig, "loco/blind", ["scan_spacing=0.05", "scan_ahead=1.6"])
     network = BlindActor()
     folder = save_policy(tmp_path / "blind", network, locomotion_card("blind", network.describe()))
     start = load_warm_start(str(folder), blind).actor
-    BlindActor(scan=FINE.size).load_state_dict(start)
+    BlindActor(scan=SCAN.size).load_state_dict(start)
     with pytest.raises(InputError, match="BlindActor"):
         load_warm_start(str(folder), config)
 
 
-def test_what_does_not_fit_is_refused(fine: Path) -> None:
+def test_what_does_not_fit_is_refused(other: Path, tmp_path: Path) -> None:
     coarse = load_config(LocoConfig, "loco/teacher_step")
     assert coarse.scan == STANDARD_SCAN
-    with pytest.raises(InputError, match=r"scan 693.*scan 187.*scan_spacing"):
-        load_warm_start(str(fine), coarse)
+    with pytest.raises(InputError, match=r"scan 1029.*scan 187.*scan_spacing, scan_ahead"):
+        load_warm_start(str(other), coarse)
     for value in ("0.07", "0", "-0.1", ".nan"):
         with pytest.raises(InputError, match=r"scan_spacing must be 0.1 or 0.05 m"):
             load_config(LocoConfig, "loco/teacher_step", [f"scan_spacing={value}"])
+        with pytest.raises(InputError, match=r"scan_ahead must be 0.8 or 1.6 m"):
+            load_config(LocoConfig, "loco/teacher_step", [f"scan_ahead={value}"])
+    # it lacks points that the fine one reads, although it has more of them ahead
+    with pytest.raises(InputError, match=r"scan 693.*scan 275"):
+        load_warm_start(str(untrained(tmp_path, HeightScan(0.05))), load_config(LocoConfig, "loco/teacher_ahead"))
