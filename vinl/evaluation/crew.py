@@ -43,7 +43,7 @@ class Crew:
 
     Args:
         workers: number of processes.
-        shared: handed to every job; pickled once a process.
+        shared: handed to every job; unpickled once a process.
     """
 
     def __init__(self, workers: int, shared: Any) -> None:
@@ -55,9 +55,15 @@ class Crew:
             # spawn, not fork: forked children of a process with torch's threads may hang
             context = multiprocessing.get_context("spawn")
             self._messages, self._stop = context.Queue(), context.Event()
+            # Not among the arguments of a process: to hand over more than a pipe holds waits until the new process has
+            # imported everything, and all would start one after the other. A queue has a thread for that.
+            self._luggage = context.Queue()
             self._pool = ProcessPoolExecutor(
-                self._workers, context, _start, (pickle.dumps(self._shared), self._messages, self._stop)
+                self._workers, context, _start, (self._luggage, self._messages, self._stop)
             )
+            packed = pickle.dumps(self._shared)
+            for _ in range(self._workers):
+                self._luggage.put(packed)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
@@ -66,8 +72,9 @@ class Crew:
         if kind is not None:
             self._stop.set()
         self._pool.shutdown(wait=True, cancel_futures=True)
-        self._messages.cancel_join_thread()
-        self._messages.close()
+        for channel in (self._messages, self._luggage):
+            channel.cancel_join_thread()
+            channel.close()
 
     def run(self, work: Callable[[Context, Any], T], jobs: list[Any], on_piece: Callable[..., None]) -> list[T]:
         """All jobs; the answers in the order of the jobs. ``on_piece`` is called for each piece that a job reports,
@@ -112,12 +119,12 @@ def one_thread() -> Iterator[None]:
 _context: Context | None = None
 
 
-def _start(shared: bytes, messages: Any, stop: Any) -> None:
+def _start(luggage: Any, messages: Any, stop: Any) -> None:
     """First thing in a worker. Ctrl-C reaches the whole group: only the parent answers it."""
     global _context
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     torch.set_num_threads(1)
-    _context = Context(pickle.loads(shared), lambda *piece: messages.put(piece), stop.is_set)
+    _context = Context(pickle.loads(luggage.get()), lambda *piece: messages.put(piece), stop.is_set)
 
 
 def _run(work: Callable[[Context, Any], T], job: Any) -> tuple[T, int]:

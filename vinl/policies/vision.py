@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -106,8 +108,6 @@ class GroupNorm(nn.GroupNorm):
 
     def forward(self, input: Tensor) -> Tensor:
         """Normalised maps of the same shape and type."""
-        if input.is_meta:  # autocast does not know the device that only counts shapes
-            return super().forward(input)
         with torch.autocast(input.device.type, enabled=False):
             weight, bias = self.weight.to(input.dtype), self.bias.to(input.dtype)
             return functional.group_norm(input, self.num_groups, weight, bias, self.eps)
@@ -133,16 +133,29 @@ class _Block(nn.Module):
         return functional.relu(self.path(x) + self.shortcut(x))
 
 
-def _count(maps: nn.Module, height: int, width: int) -> int:
-    """Numbers in the maps of one image."""
-    with torch.no_grad():
-        return maps(torch.zeros(1, 1, height, width)).numel()
+def _count(maps: nn.Sequential, height: int, width: int) -> int:
+    """Numbers in the maps of one image, from the sizes of the layers: to try it on the device that only counts shapes,
+    where shipped networks are built, torch loads for more than a second."""
+    channels, sides = 1, (height, width)
+    for layer in (step for part in maps for step in (part.path if isinstance(part, _Block) else [part])):
+        if isinstance(layer, nn.Conv2d | nn.MaxPool2d):
+            kernel, stride, pad = (_pair(x) for x in (layer.kernel_size, layer.stride, layer.padding))
+            sides = tuple((n + 2 * p - k) // s + 1 for n, k, s, p in zip(sides, kernel, stride, pad, strict=True))
+        if isinstance(layer, nn.Conv2d):
+            channels = layer.out_channels
+    return channels * sides[0] * sides[1]
+
+
+def _pair(size: Any) -> tuple[int, int]:
+    return size if isinstance(size, tuple) else (size, size)
 
 
 def _start_weights(network: nn.Module) -> None:
     """He's start for convolutions and linear layers, zero biases [ViNL code]."""
     for layer in network.modules():
-        if isinstance(layer, nn.Conv2d | nn.Linear):
+        if (
+            isinstance(layer, nn.Conv2d | nn.Linear) and not layer.weight.is_meta
+        ):  # drawn there, torch loads for a second
             nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
             if layer.bias is not None:
                 nn.init.zeros_(layer.bias)

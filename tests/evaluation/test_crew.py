@@ -1,0 +1,34 @@
+"""Workers start side by side, whatever is handed to them."""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+import time
+
+from vinl.evaluation.crew import Context, Crew
+
+
+def tell_size(context: Context, job: int) -> int:
+    context.tell(job, len(context.shared))
+    return job
+
+
+def test_no_worker_waits_until_the_one_before_has_started() -> None:
+    workers, seen, told, over = 4, {}, [], threading.Event()
+
+    def count() -> None:
+        while not over.wait(0.005):
+            seen.setdefault(len(multiprocessing.active_children()), time.perf_counter())
+
+    watch = threading.Thread(target=count)
+    watch.start()
+    try:
+        with Crew(workers, bytes(4_000_000)) as crew:  # more than a pipe holds, as floor plans and policies are
+            began = time.perf_counter()
+            answers = crew.run(tell_size, list(range(8)), lambda *piece: told.append((time.perf_counter(), piece)))
+    finally:
+        over.set()
+        watch.join()
+    assert answers == list(range(8)) and sorted(piece for _, piece in told) == [(k, 4_000_000) for k in range(8)]
+    assert seen.get(workers, float("inf")) - began < 0.5 * (told[0][0] - began)
