@@ -64,11 +64,15 @@ def test_a_robot_that_does_not_come_on_is_freed_and_the_policy_is_told(two_rooms
     navigator.reset([task, task])
     choices = []
     for step in range(11):
-        poses = np.array([[0.0, 0.0, 0.0], [0.3 * step, 0.0, 0.0]])  # the first stands, the second walks
+        # the first stands, and in the end has come back a little; the second walks
+        poses = np.array([[-0.5 * (step == 10), 0.0, 0.0], [0.3 * step, 0.0, 0.0]])
         goal = np.array([[10.0, 1.0, 0.0], [10.0, 1.0, 0.0]])
         observation = {"goal": goal, "depth": torch.full((2, 8, 12), 5.0), "pose": poses}
         choices.append(navigator.act(observation))
     told = [policy.network.seen[step + 1][1][0, :, 3:] for step in (7, 9)]  # type: ignore[index]
+    image = policy.network.seen[10][0].reshape(2, 8, 12)  # type: ignore[index]
+    assert (image[0].min() < 0.05) == recover  # the nearer side of a post
+    np.testing.assert_allclose(image[1], 0.5)
     if recover:
         np.testing.assert_allclose(choices[7], [[-0.3, 0.0], [0.8, 0.0]], atol=1e-6)
         np.testing.assert_allclose(told[0], [[-1.0, 0.0], [0.6, 0.0]], atol=1e-6)  # the nearest that there is

@@ -9,9 +9,16 @@ from vinl.evaluation.recovery import Recovery
 RATE, SPEED = 1.0, 0.5
 
 
-def drive(recovery: Recovery, poses: np.ndarray, choice: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Choices and who is freed, over time, for given poses (t, n, 3) and one choice (n, 2)."""
-    out = [recovery.correct(pose, choice) for pose in poses]
+def drive(
+    recovery: Recovery, poses: np.ndarray, choice: np.ndarray, room: bool = True
+) -> tuple[np.ndarray, np.ndarray]:
+    """Choices and who is freed, over time, for given poses (t, n, 3) and one choice (n, 2). Where there is room robots
+    that are told to turn on the spot do so."""
+    out, turned = [], np.zeros(poses.shape[1])
+    for pose in poses:
+        shown = pose + np.stack([0 * turned, 0 * turned, turned], 1)
+        out.append(recovery.correct(shown, choice))
+        turned += room * 0.5 * np.where(out[-1][0][:, 0] == 0, out[-1][0][:, 1], 0.0)
     return np.array([c for c, _ in out]), np.array([f for _, f in out])
 
 
@@ -47,6 +54,14 @@ def test_a_stuck_robot_backs_up_turns_away_and_walks_and_longer_to_the_other_sid
     assert done[4:8] == [("own", 6, 0.2), ("back", 4, 0.0), ("turn", 4, RATE), ("walk", 4, 0.0)]
     assert done[8:12] == [("own", 6, 0.2), ("back", 6, 0.0), ("turn", 6, -RATE), ("walk", 6, 0.0)]
     assert (out[~freed[:, 0]] == choice).all() and set(out[freed[:, 0], 0, 0]) == {-0.3, 0.0, SPEED}
+
+
+def test_one_that_had_no_room_to_turn_does_not_walk_into_the_same_place_again() -> None:
+    poses = np.tile([[1.0, 2.0, 0.0]], (40, 1, 1))
+    out, freed = drive(Recovery(1, SPEED, RATE), poses, np.array([[0.6, 0.2]]), room=False)
+    done = phases(out[:, 0], freed[:, 0])
+    assert done[:3] == [("own", 6, 0.2), ("back", 2, 0.0), ("turn", 2, -RATE)]
+    assert done[3:6] == [("own", 6, 0.2), ("back", 4, 0.0), ("turn", 4, RATE)]
 
 
 def test_one_that_is_stuck_elsewhere_starts_anew_and_robots_do_not_share_their_past() -> None:

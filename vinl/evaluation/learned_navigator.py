@@ -12,6 +12,7 @@ from vinl.config.errors import InputError
 from vinl.evaluation.navigator import Task
 from vinl.evaluation.odometry import measure_twist
 from vinl.evaluation.recovery import Recovery
+from vinl.evaluation.stuck_places import StuckPlaces
 from vinl.policies.card import NAVIGATION_TABLE, PolicyCard, find_previous
 from vinl.policies.policy import Policy
 from vinl.policies.velocity_range import VelocityRange
@@ -33,7 +34,8 @@ class LearnedNavigator:
     Args:
         policy: observes (n, 5 or 7): distance / 5 m, cosine and sine of the bearing, and its last step; and depth.
         period: between two decisions [s].
-        recover: free robots that have not moved for a while (``Recovery``), whatever the policy says.
+        recover: free robots that have not moved for a while (``Recovery``), whatever the policy says, and let it see a
+            post where they were stuck (``StuckPlaces``).
 
     Attributes:
         policy: as given.
@@ -55,7 +57,8 @@ class LearnedNavigator:
         self._period, self._previous = period, find_previous(policy.card)
         self._last = np.zeros((0, 2), np.float32)
         self._pose: np.ndarray | None = None
-        self._recover, self._recovery = recover, self._watch(0)
+        self._recover = recover
+        self.reset([])
 
     @property
     def card(self) -> PolicyCard:
@@ -67,28 +70,36 @@ class LearnedNavigator:
         self.policy.reset(len(episodes))
         self._last = np.zeros((len(episodes), 2), np.float32)
         self._pose = None
-        self._recovery = self._watch(len(episodes))
+        # walks ahead at the given speed, turns at the policy's highest rate
+        rate = float(self._range.velocity(np.ones((1, 2), np.float32))[0, 1])
+        self._recovery = Recovery(len(episodes), _RECOVERY_SPEED, rate)
+        seen = self.camera if self._recover else None
+        self._places = None if seen is None else StuckPlaces(len(episodes), seen, self._period)
 
     def act(self, observation: dict[str, Any]) -> Float[np.ndarray, "n 2"]:
         """See ``Navigator.act``; reads ``goal``, ``depth`` and, to see how far the robot came, ``pose``."""
+        pose = np.asarray(observation["pose"], np.float64)
         goal = np.asarray(observation["goal"], np.float32) * np.array([_DISTANCE_SCALE, 1.0, 1.0], np.float32)
         parts = [goal]
         if self._previous != "motion":
             parts.append(self._last)
         if self._previous != "action":
-            parts.append(self._measure(np.asarray(observation["pose"], np.float64)))
+            parts.append(self._measure(pose))
         vector = np.concatenate(parts, 1)
-        action = self.policy.act(vector) if self.camera is None else self.policy.act(vector, observation["depth"])
+        if self.camera is None:
+            action = self.policy.act(vector)
+        else:
+            depth = observation["depth"]
+            action = self.policy.act(vector, depth if self._places is None else self._places.draw(pose, depth))
         self._last = np.clip(np.asarray(action, np.float32), -1.0, 1.0)
         choice = self._range.velocity(self._last)
         if not self._recover:
             return choice
-        choice, freed = self._recovery.correct(np.asarray(observation["pose"], np.float64), choice)
+        choice, freed = self._recovery.correct(pose, choice)
+        if self._places is not None:
+            self._places.remember(self._recovery.found, pose)
         self._last[freed] = self._range.action(choice[freed])
         return choice
-
-    def _watch(self, n: int) -> Recovery:
-        return Recovery(n, _RECOVERY_SPEED, float(self._range.velocity(np.ones((1, 2), np.float32))[0, 1]))
 
     def _measure(self, pose: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
         """The motion since the last decision in units of the action; zero at the first."""

@@ -16,6 +16,9 @@ _BACK_SPEED = -0.3
 """Forward speed of a robot that walks back [m/s]. No navigator asks for it, but every locomotor descends from one that
 was trained to (``configs/loco/rough.yaml``); faster than that they were never tried."""
 
+_TURNED = 0.4
+"""A robot that turned by less than this [rad] had no room to, and would walk into the same place: it does not."""
+
 _AWAY_M = 1.0
 """A robot that is stuck so far from where it was stuck last starts anew with the first try [m]."""
 
@@ -31,6 +34,9 @@ class Recovery:
         n: robots.
         speed: at which a robot walks ahead once it has turned [m/s].
         turn_rate: at which it turns [rad/s].
+
+    Attributes:
+        found: (n,) whether a robot was found to be stuck at the last decision.
     """
 
     def __init__(self, n: int, speed: float, turn_rate: float) -> None:
@@ -39,7 +45,8 @@ class Recovery:
         self._backs, self._turns, self._walks = np.zeros((3, n), int)  # decisions left of each
         self._calm = np.zeros(n, int)  # decisions until it may be called stuck again
         self._tries, self._side = np.zeros(n, int), np.ones(n)
-        self._where = np.full((n, 2), np.inf)
+        self._where, self._yaw = np.full((n, 2), np.inf), np.zeros(n)
+        self.found = np.zeros(n, bool)
 
     def correct(
         self, pose: Float[np.ndarray, "n 3"], choice: Float[np.ndarray, "n 2"]
@@ -54,15 +61,17 @@ class Recovery:
             The choice, for robots that are being freed another one, and who these are.
         """
         self._past = [*self._past, pose.copy()][-_STILL - 1 :]
-        stuck = self._are_still(pose) & (self._calm == 0)
+        stuck = self.found = self._are_still(pose) & (self._calm == 0)
         again = stuck & (np.linalg.norm(pose[:, :2] - self._where, axis=1) < _AWAY_M)
         self._side = np.where(again, -self._side, np.where(stuck, np.where(choice[:, 1] > 0, -1.0, 1.0), self._side))
         self._where[stuck & ~again] = pose[stuck & ~again, :2]
+        self._yaw[stuck] = pose[stuck, 2]
         self._tries[stuck] = np.where(again, self._tries + 1, 1)[stuck]
         for part in (self._backs, self._turns, self._walks):
             part[stuck] = np.minimum(_PART * self._tries[stuck], _LONGEST)
         backs = self._backs > 0
         turns = ~backs & (self._turns > 0)
+        self._walks[~backs & ~turns & (_angle(pose[:, 2] - self._yaw) < _TURNED)] = 0
         walks = ~backs & ~turns & (self._walks > 0)
         freed = backs | turns | walks
         choice = choice.copy()
@@ -80,5 +89,10 @@ class Recovery:
         if len(self._past) <= _STILL:
             return np.zeros(len(pose), bool)
         change = np.array(self._past) - pose
-        turned = np.abs((change[..., 2] + np.pi) % (2 * np.pi) - np.pi).max(0)
+        turned = _angle(change[..., 2]).max(0)
         return (np.linalg.norm(change[..., :2], axis=-1).max(0) < _STILL_M) & (turned < _STILL_RAD)
+
+
+def _angle(difference: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """How far two headings are apart [rad]."""
+    return np.abs((difference + np.pi) % (2 * np.pi) - np.pi)
