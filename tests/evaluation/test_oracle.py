@@ -85,11 +85,19 @@ def test_frees_itself_when_stuck(two_rooms: FloorPlan) -> None:
     oracle = OracleNavigator()
     oracle.reset([Task(FreeSpace(two_rooms), route)])
     pose = np.array([[*route.start, np.arctan2(*(route.goal - route.start)[::-1]) + 1.0]])
-    choices = np.concatenate([oracle.act({"pose": pose}) for _ in range(20)])
+    found = []
+    for _ in range(20):
+        found.append(oracle.act({"pose": pose})[0])
+        if 8 <= len(found) - 1 < 10:  # what is in its way holds it, but lets it turn on the spot
+            pose[0, 2] += 0.5 * found[-1][1]
+    choices = np.array(found)
     assert (choices[:6] == choices[0]).all(), "it tries for 3 s"
     assert (choices[6:8] == [-0.3, 0.0]).all()
     assert (choices[8:10] == [0.0, -np.sign(choices[0, 1]) * oracle.config.turn_rate]).all()
-    assert (choices[10:12] == [oracle.config.speed, 0.0]).all() and (choices[12] == choices[0]).all()
+    assert (choices[10:12] == [oracle.config.speed, 0.0]).all()
+    fresh = OracleNavigator()
+    fresh.reset([Task(FreeSpace(two_rooms), route)])
+    assert (choices[12] == fresh.act({"pose": pose})[0]).all(), "it is left to itself"
 
 
 def test_unknown_navigator() -> None:
