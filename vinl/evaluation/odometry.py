@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
+from vinl.robot.rotation import wrap_angle
+
 
 def measure_twist(
     before: Float[np.ndarray, "n 3"], after: Float[np.ndarray, "n 3"], period: float
@@ -16,7 +18,7 @@ def measure_twist(
         period: between them [s].
     """
     step = after[:, :2] - before[:, :2]
-    turn = (after[:, 2] - before[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    turn = wrap_angle(after[:, 2] - before[:, 2])
     chord = np.sinc(turn / 2 / np.pi)  # chord over arc
     heading = before[:, 2] + turn / 2
     c, s = np.cos(heading), np.sin(heading)

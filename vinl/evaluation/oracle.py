@@ -14,6 +14,7 @@ from vinl.evaluation.navigator import Task
 from vinl.evaluation.recovery import Recovery
 from vinl.evaluation.way import Way, plan_way
 from vinl.robot.cameras import Camera
+from vinl.robot.rotation import wrap_angle
 
 _SLOWEST = 0.6
 """Share of the speed and of the look-ahead that is left in the narrowest gaps: at 2 Hz and full speed the robot would
@@ -47,7 +48,7 @@ class OracleNavigator:
             target[k], left[k], ease[k] = self._aim(k, pose[k, :2])
         c, to = self.config, target - pose[:, :2]
         error = np.arctan2(to[:, 1], to[:, 0]) - pose[:, 2]
-        error = (error + np.pi) % (2 * np.pi) - np.pi
+        error = wrap_angle(error)
         turn = np.clip(c.turn_gain * error, -c.turn_rate, c.turn_rate)
         # full speed straight ahead, none at the error where it turns on the spot; slower over the last metre
         ahead = np.clip(1.0 - np.abs(error) / c.turn_in_place, 0.0, 1.0) ** 0.5

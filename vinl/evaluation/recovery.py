@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float
 
+from vinl.robot.rotation import wrap_angle
+
 _STILL, _STILL_M, _STILL_RAD = 6, 0.12, 0.2
 """A robot that in so many decisions (3 s) moved [m] and turned [rad] less than this is stuck."""
 
@@ -71,7 +73,7 @@ class Recovery:
             part[stuck] = np.minimum(_PART * self._tries[stuck], _LONGEST)
         backs = self._backs > 0
         turns = ~backs & (self._turns > 0)
-        self._walks[~backs & ~turns & (_angle(pose[:, 2] - self._yaw) < _TURNED)] = 0
+        self._walks[~backs & ~turns & (np.abs(wrap_angle(pose[:, 2] - self._yaw)) < _TURNED)] = 0
         walks = ~backs & ~turns & (self._walks > 0)
         freed = backs | turns | walks
         choice = choice.copy()
@@ -89,10 +91,5 @@ class Recovery:
         if len(self._past) <= _STILL:
             return np.zeros(len(pose), bool)
         change = np.array(self._past) - pose
-        turned = _angle(change[..., 2]).max(0)
+        turned = np.abs(wrap_angle(change[..., 2])).max(0)
         return (np.linalg.norm(change[..., :2], axis=-1).max(0) < _STILL_M) & (turned < _STILL_RAD)
-
-
-def _angle(difference: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
-    """How far two headings are apart [rad]."""
-    return np.abs((difference + np.pi) % (2 * np.pi) - np.pi)

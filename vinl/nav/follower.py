@@ -10,6 +10,7 @@ from torch import Tensor
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.home_builder import FIELD_RESOLUTION, FINE
 from vinl.policies.velocity_range import VelocityRange
+from vinl.robot.rotation import wrap_angle
 from vinl.world.geodesic import comfortable_path
 from vinl.world.grid import GridFrame
 
@@ -52,7 +53,7 @@ class PathFollower:
         yaw = environment.state["yaw"].cpu().numpy()
         blocked = environment.state["in_a_row"].cpu().numpy()
         to = np.array([self._aim(k, xy) for k, xy in enumerate(position)]) - position
-        error = (np.arctan2(to[:, 1], to[:, 0]) - yaw + np.pi) % (2 * np.pi) - np.pi
+        error = wrap_angle(np.arctan2(to[:, 1], to[:, 0]) - yaw)
         turn = np.clip(error / robot.period / robot.max_yaw_rate, -1.0, 1.0)
         # straight to a near point, not past it; nothing where the robot has to turn first
         speed = np.minimum(_SPEED, np.linalg.norm(to, axis=1) / robot.period)

@@ -151,11 +151,10 @@ def _pair(size: Any) -> tuple[int, int]:
 
 
 def _start_weights(network: nn.Module) -> None:
-    """He's start for convolutions and linear layers, zero biases [ViNL code]."""
+    """He's start for convolutions and linear layers, zero biases [ViNL code]. Weights without numbers are left alone:
+    to draw those, torch loads for more than a second."""
     for layer in network.modules():
-        if (
-            isinstance(layer, nn.Conv2d | nn.Linear) and not layer.weight.is_meta
-        ):  # drawn there, torch loads for a second
+        if isinstance(layer, nn.Conv2d | nn.Linear) and not layer.weight.is_meta:
             nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
             if layer.bias is not None:
                 nn.init.zeros_(layer.bias)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,11 @@ def _cross(xp: Any, a: Any, b: Any) -> Any:
     ax, ay, az = (a[..., k] for k in range(3))
     bx, by, bz = (b[..., k] for k in range(3))
     return xp.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], -1)
+
+
+def wrap_angle(angle: Any) -> Any:
+    """The same angle [rad] within half a turn of zero, for arrays of any kind."""
+    return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
 def yaw_of(xp: Any, quaternion: Any) -> Any:
