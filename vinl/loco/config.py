@@ -71,6 +71,8 @@ class RewardConfig:
         obstacle_contact: feet that touch a block or wall.
         leg_contact: shanks that touch a block or wall (``collision`` counts them once more).
         near_block: feet within 5 cm of a block, above or beside it: 0 there, 1 where they touch.
+        low_feet: speed of the feet over the ground where they are less than 5 cm above everything within 10 cm, times
+            what they lack [5 cm]: for each metre that a foot slides, 1 on level ground, 5 through a block 0.2 m high.
         orientation: squared tilt of the trunk.
         stand_still: joint angles away from the default pose while told to stand.
         fall: one fall (not multiplied by the control step).
@@ -94,6 +96,7 @@ class RewardConfig:
     obstacle_contact: float = 0.0
     leg_contact: float = 0.0
     near_block: float = 0.0
+    low_feet: float = 0.0
     orientation: float = 0.0
     stand_still: float = 0.0
     velocity_error: float = 0.0

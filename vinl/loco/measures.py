@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from vinl.loco.config import RewardConfig
 from vinl.loco.rewards import Motion
+from vinl.loco.simulation import FEET
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.world.heightfield import BLOCK
 from vinl.world.terrain import RESOLUTION, TILE, Terrain
@@ -37,6 +38,7 @@ MEASURES = (
     "foot_wall",
     "over_block",
     "covered",
+    "landings",
     "not_finite",
     "level",
     "clipped",
@@ -76,6 +78,7 @@ def sum_measures(
         "foot_wall": m.contacts.foot_wall.any(1),
         "over_block": over,
         "covered": cover,
+        "landings": m.landed.sum(1),
         "not_finite": broken,
         "level": level,
         "clipped": clipped,
@@ -104,6 +107,7 @@ def average_sums(sums: Float[np.ndarray, " m"]) -> dict[str, float]:
         "shank_block_per_m": raw["shank_block"] / metres,
         "foot_wall_per_m": raw["foot_wall"] / metres,
         "trunk_over_blocks": raw["over_block"] / max(raw["covered"], 1.0),
+        "stride": FEET * raw["metres"] / max(raw["landings"], 1.0),
         "clipped": raw["clipped"] / steps,
         "not_finite": raw["not_finite"],
         **{name: value / steps / CONTROL_DT for name, value in raw.items() if name.startswith("reward/")},

@@ -77,6 +77,7 @@ def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"
         "obstacle_contact": foot_hit.sum(1).astype(jnp.float32),
         "leg_contact": shank_hit.sum(1).astype(jnp.float32),
         "near_block": jnp.sum(jnp.clip(1 - m.contacts.foot_gap / NEAR_BLOCK, 0.0, 1.0), 1),
+        "low_feet": jnp.sum(m.contacts.foot_low, 1) / CONTROL_DT,
         "orientation": jnp.sum(m.gravity[:, :2] ** 2, 1),
         "stand_still": jnp.sum(jnp.abs(m.joints - jnp.asarray(DEFAULT_POSE, jnp.float32)), 1) * told_to_stand,
         "velocity_error": error2,

@@ -34,6 +34,12 @@ SHANK_REACH = 0.018
 """A shank nearer than this to a block [m] touches it: the capsule's 0.0145 m and the error of the grid. Chosen so that
 the count agrees with MuJoCo C's contacts of the capsule on the same motion."""
 
+LIFT = 0.05
+"""A foot should move so high above everything near it [m]: half the pitch of the height scan, as ``NEAR_BLOCK``."""
+
+_LIFT_CELLS = 2
+"""Near it is within this many cells, 10 cm: as far as a foot's way to a block's edge rises or falls over the block."""
+
 FOOT_REACH = FOOT_RADIUS + 0.02
 """A foot whose middle is farther than this from any block [m] does not touch one: what it touches then is the slope
 that the height field has for the block's side, up to a cell wide."""
@@ -48,6 +54,7 @@ class Ground(NamedTuple):
         near: (rows * columns,) bit 1: a block lies near; bit 2: a wall lies near.
         distance, top: (rows * columns,) distance from the nearest block and its height [m], for the shanks; one number
             where the ground has no blocks.
+        crest: (rows * columns,) height of the highest ground or block within 10 cm [m]; walls do not count.
     """
 
     normalised: Float[Array, " cells"]
@@ -55,6 +62,7 @@ class Ground(NamedTuple):
     near: Array
     distance: Float[Array, " cells"]
     top: Float[Array, " cells"]
+    crest: Float[Array, " cells"]
 
 
 class Body(NamedTuple):
@@ -76,6 +84,8 @@ class Contacts(NamedTuple):
         foot, shank: (n, 4) anything; trunk: (n,) anything; trunk_down: (n,) something from above.
         foot_block, shank_block, foot_wall, shank_wall: (n, 4) a block, a wall.
         foot_gap: (n, 4) least distance of a foot's surface from the blocks at any substep, at most ``FAR`` [m].
+        foot_low: (n, 4) each foot's way over the ground [m], times how many ``LIFT`` its surface lacks on it to be one
+            ``LIFT`` above everything near.
     """
 
     foot: Bool[Array, "n 4"]
@@ -87,6 +97,7 @@ class Contacts(NamedTuple):
     foot_wall: Bool[Array, "n 4"]
     shank_wall: Bool[Array, "n 4"]
     foot_gap: Float[Array, "n 4"]
+    foot_low: Float[Array, "n 4"]
 
 
 class Simulation:
@@ -138,7 +149,9 @@ class Simulation:
         near = _near(field, BLOCK) + 2 * _near(field, WALL)
         # committed arrays only: a mixture of committed and uncommitted ones compiles every program twice
         self.ground = jax.device_put(
-            Ground(*(jnp.asarray(x.reshape(-1)) for x in (normalised, field.heights, near, distance, top))),
+            Ground(
+                *(jnp.asarray(x.reshape(-1)) for x in (normalised, field.heights, near, distance, top, _crest(field)))
+            ),
             jax.devices()[0],
         )
         self._contact_rows = self._find_contact_rows()
@@ -186,7 +199,7 @@ class Simulation:
         Returns:
             The new state, the latched contacts and the torques of the last substep [N m].
         """
-        qpos, qvel, warm, flags, gap, torque = self._substeps(ground, *body, target, friction, added_mass)
+        qpos, qvel, warm, flags, gap, low, torque = self._substeps(ground, *body, target, friction, added_mass)
         n = len(qpos)
         touch, block, wall = (
             flags[:, : LEGS + TRUNK],
@@ -207,6 +220,7 @@ class Simulation:
             foot_wall=wall[:, :FEET],
             shank_wall=by_leg(wall),
             foot_gap=gap,
+            foot_low=low,
         )
         return Body(qpos, qvel, warm), contacts, torque
 
@@ -243,11 +257,22 @@ class Simulation:
             down = jnp.any(on[LEGS:] & (up[LEGS:] > 0.5))
             new = jnp.concatenate([jnp.any(on, 1), block, wall, beside, down[None]])
             gap = jnp.minimum(gap, free - FOOT_RADIUS)
-            return (data.qpos, data.qvel, data.qacc_warmstart, flags | new, gap, data.actuator_force), None
+            feet = data.geom_xpos[self._feet]
+            return (data.qpos, data.qvel, data.qacc_warmstart, flags | new, gap, data.actuator_force), feet
 
         flags = jnp.zeros(3 * LEGS + TRUNK + FEET + 1, bool)
         start = (qpos, qvel, warm, flags, jnp.full(FEET, FAR), jnp.zeros(12))
-        return jax.lax.scan(substep, start, None, length=SUBSTEPS)[0]
+        end, feet = jax.lax.scan(substep, start, None, length=SUBSTEPS)
+        return *end[:-1], self._low_way(ground, feet), end[-1]
+
+    def _low_way(self, ground: Ground, feet: Float[Array, "substeps 4 3"]) -> Float[Array, "4"]:
+        """``Contacts.foot_low`` of one robot from where its feet were when the substeps began."""
+        middle = (feet[1:] + feet[:-1]) / 2
+        way = jnp.linalg.norm(feet[1:, :, :2] - feet[:-1, :, :2], axis=-1)
+        lack = ground.crest[self.cell(middle[..., :2])] + LIFT - (middle[..., 2] - FOOT_RADIUS)
+        return jnp.sum(way * jnp.maximum(lack / LIFT, 0.0), 0) * (
+            SUBSTEPS / (SUBSTEPS - 1)
+        )  # the last one's end is not known
 
     def _at_blocks(self, ground: Ground, data: mjx.Data) -> tuple[Float[Array, "4"], Bool[Array, "4"]]:
         """By geometry: how far the middles of one robot's feet are from the blocks [m], and which of its shanks touch
@@ -263,3 +288,10 @@ class Simulation:
 def _near(field: HeightField, label: int) -> np.ndarray:
     """(rows, columns) uint8: 1 where a cell with the label lies near."""
     return ndimage.maximum_filter((field.labels == label).astype(np.uint8), 2 * _NEAR + 1)
+
+
+def _crest(field: HeightField) -> np.ndarray:
+    """(rows, columns) height of the highest ground or block near, for ``Ground.crest``."""
+    side = np.arange(-_LIFT_CELLS, _LIFT_CELLS + 1)
+    disc = np.hypot(*np.meshgrid(side, side)) <= _LIFT_CELLS
+    return ndimage.maximum_filter(np.where(field.labels == WALL, 0.0, field.heights).astype(np.float32), footprint=disc)
