@@ -20,6 +20,7 @@ PANELS = {
     "linear_tracking": "velocity tracking, exp(-error² / 0.25)",
     "falls_per_minute": "falls per robot-minute",
     "foot_block_per_m": "feet and shanks on blocks, control steps per metre",
+    "stride": "stride: way between two landings of a foot [m]",
     "trunk_over_blocks": "time above blocks / the share of ground they cover",
     "loss/unexplained": "unexplained share of the teacher's code",
     "success": "success",

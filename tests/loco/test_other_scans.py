@@ -1,4 +1,4 @@
-"""Points 5 cm apart that reach 1.6 m ahead: trained with, started with from less, evaluated, taught with."""
+"""Points 5 cm apart that reach 1.6 m ahead, and others about the feet: trained with, evaluated, taught with."""
 
 import json
 import shutil
@@ -27,10 +27,11 @@ from vinl.sensing.height_scan import scan_ground
 from vinl.world.grid import GridFrame
 from vinl.world.readers import shipped_floorplans
 
-SCAN = HeightScan(0.05, 1.6)
+SCAN = HeightScan(0.05, 1.6, feet=True)
 SMALL = [
     "scan_spacing=0.05",
     "scan_ahead=1.6",
+    "scan_feet=true",
     "num_envs=16",
     *BLOCK_TILES,
     "terrain.joined=0",
@@ -99,7 +100,7 @@ def test_actor_and_critic_are_given_each_cell_of_the_ground(env: LocoEnvironment
     expected = observe(np, qpos, qvel, np.asarray(state.command), np.asarray(state.action), ground)
     noisy, exact = (np.asarray(x) for x in env.observe())
     # MJX and numpy round sines differently: a point on the border of two cells may fall on either side
-    assert exact.shape == (16, 1077) and np.isclose(exact, expected, atol=1e-4).mean() > 0.999
+    assert exact.shape == (16, SCAN.observation_size) and np.isclose(exact, expected, atol=1e-4).mean() > 0.999
     noise = np.abs(noisy - exact)[:, 48:] / SCAN.noise[48:]
     share = env.config.randomisation.observation_noise
     assert (noise.max(0) > 0.3 * share).all() and noise.max() <= share * 1.001
@@ -137,7 +138,7 @@ def test_it_trains_goes_on_and_is_evaluated(tmp_path: Path, compiled_once) -> No
     rows = [json.loads(line) for line in (tmp_path / "run" / "metrics.jsonl").read_text().splitlines()]
     assert [row["iteration"] for row in rows] == [1, 2, 3]
     policy = load_policy(run)
-    assert policy.card.observation == describe(SCAN) and policy.card.observation_size == 1077
+    assert policy.card.observation == describe(SCAN) and policy.card.observation_size == SCAN.observation_size
     assert policy.card.training["scan_ahead"] == 1.6
     # from a fine run as it is: while the critic warms up the actor stays
     assert main([*command, "--from", run, "--out", second, "--iterations", "1"]) == 0
@@ -159,13 +160,11 @@ def test_a_student_learns_from_it(other: Path, compiled_once, capsys: pytest.Cap
     capsys.readouterr()
     assert main([*command, "scan_ahead=0.8", "--out", "other"]) == 2
     error = capsys.readouterr().err
-    assert (
-        "1077 numbers" in error and "scan_spacing=0.05 scan_ahead=1.6" in error and len(error.strip().splitlines()) == 1
-    )
+    assert "1217 numbers" in error and f"set {SCAN.settings}" in error and len(error.strip().splitlines()) == 1
 
 
 def test_a_blind_policy_of_either_scan_is_a_policy(tmp_path: Path, config: LocoConfig) -> None:
-    blind = load_config(LocoConfig, "loco/blind", ["scan_spacing=0.05", "scan_ahead=1.6"])
+    blind = load_config(LocoConfig, "loco/blind", ["scan_spacing=0.05", "scan_ahead=1.6", "scan_feet=true"])
     network = BlindActor()
     folder = save_policy(tmp_path / "blind", network, locomotion_card("blind", network.describe()))
     start = load_warm_start(str(folder), blind).actor
@@ -177,7 +176,7 @@ def test_a_blind_policy_of_either_scan_is_a_policy(tmp_path: Path, config: LocoC
 def test_what_does_not_fit_is_refused(other: Path, tmp_path: Path) -> None:
     coarse = load_config(LocoConfig, "loco/teacher_step")
     assert coarse.scan == STANDARD_SCAN
-    with pytest.raises(InputError, match=r"scan 1029.*scan 187.*scan_spacing, scan_ahead"):
+    with pytest.raises(InputError, match=r"scan 1169.*scan 187.*scan_spacing, scan_ahead"):
         load_warm_start(str(other), coarse)
     for value in ("0.07", "0", "-0.1", ".nan"):
         with pytest.raises(InputError, match=r"scan_spacing must be 0.1 or 0.05 m"):

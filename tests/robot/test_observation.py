@@ -1,7 +1,9 @@
+import mujoco
 import numpy as np
 import pytest
 
-from vinl.robot.aliengo import DEFAULT_POSE, home_qpos
+from vinl.robot.aliengo import DEFAULT_POSE, FOOT_GEOMS, FOOT_RADIUS, home_qpos
+from vinl.robot.model import robot_spec
 from vinl.robot.observation import (
     NOISE,
     OBSERVATION_SIZE,
@@ -75,9 +77,41 @@ def test_every_other_scan_contains_the_standard_one(spacing: float, ahead: float
 
 
 def test_scans_are_told_apart_by_their_size():
-    assert len({scan.size for scan in SCANS}) == len(SCANS) == 4
+    assert len({scan.size for scan in SCANS}) == len(SCANS) == 8
     assert [find_scan(n) for n in (48, 235, 300)] == [None, STANDARD_SCAN, None]
     assert not HeightScan(0.1, 1.6).covers(HeightScan(0.05)) and not HeightScan(0.05).covers(HeightScan(0.1, 1.6))
+
+
+@pytest.mark.parametrize("trunk", [STANDARD_SCAN, HeightScan(0.05, 1.6)], ids=str)
+def test_a_scan_with_points_about_the_feet_ends_with_them(trunk: HeightScan):
+    scan = HeightScan(trunk.spacing, trunk.ahead, feet=True)
+    assert scan.size == trunk.size + 140 and find_scan(scan.observation_size) == scan
+    assert [(row["name"], row["size"]) for row in describe(scan)[-2:]] == [
+        ("height_scan", trunk.size),
+        ("foot_scan", 140),
+    ]
+    assert scan.covers(trunk) and scan.covers(STANDARD_SCAN) and not trunk.covers(scan)
+    assert (scan.places_of(trunk) == np.arange(trunk.size)).all() and (
+        scan.places_of(scan) == np.arange(scan.size)
+    ).all()
+    with pytest.raises(ValueError, match=r"lacks points"):
+        trunk.places_of(scan)
+
+
+def test_the_foot_scan_is_how_high_each_foot_is_above_the_ground():
+    qpos, scan = home_qpos(z=0.40)[None], HeightScan(0.1, feet=True)
+    ground = np.zeros((1, scan.size))
+    ground[0, 187:][35:70] = 0.03  # about the second foot
+    flat = observe(np, qpos, np.zeros((1, 18)), np.zeros((1, 3)), np.zeros((1, 12)), ground)[0, 48 + 187 :].reshape(
+        4, 35
+    )
+    model = robot_spec("primitives").compile()
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos[0]
+    mujoco.mj_kinematics(model, data)
+    high = np.array([data.geom(name).xpos[2] for name in FOOT_GEOMS]) - FOOT_RADIUS
+    expected = 5 * (high - [0, 0.03, 0, 0])
+    assert np.allclose(flat, expected[:, None], atol=1e-6) and (high > 0.01).all()
 
 
 def test_the_ground_must_be_that_of_a_scan():

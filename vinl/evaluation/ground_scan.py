@@ -60,6 +60,6 @@ class GroundScan:
 
     def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n points"]:
         """Height of the ground [m] under the scan points of every robot."""
-        at = qpos[:, :7].copy()
+        at = qpos.copy()
         at[:, 1] += self._shift
         return scan_ground(np, self._heights, self._frame, at, self._scan)

@@ -288,6 +288,7 @@ class LocoConfig:
             as exactly as the ground's cells of 5 cm have it) [m].
         scan_ahead: how far before the middle of the trunk they reach, 0.8 (half a metre before the front feet) or 1.6
             (275 points, or 1029: a block in time to pass it without haste) [m].
+        scan_feet: whether they also read it at 35 points about each foot, as the height of the foot above them.
         ppo, anneal: not used by stage 3.
         student: stage 3 alone.
     """
@@ -302,6 +303,7 @@ class LocoConfig:
     kd: float = KD
     scan_spacing: float = STANDARD_SCAN.spacing
     scan_ahead: float = STANDARD_SCAN.ahead
+    scan_feet: bool = STANDARD_SCAN.feet
     terrain: TerrainConfig = field(default_factory=TerrainConfig)
     commands: CommandConfig = field(default_factory=CommandConfig)
     rewards: RewardConfig = field(default_factory=RewardConfig)
@@ -331,5 +333,5 @@ class LocoConfig:
 
     @property
     def scan(self) -> HeightScan:
-        """The height scan with that spacing and reach."""
-        return HeightScan(self.scan_spacing, self.scan_ahead)
+        """The height scan with that spacing and reach, and with or without points about the feet."""
+        return HeightScan(self.scan_spacing, self.scan_ahead, self.scan_feet)

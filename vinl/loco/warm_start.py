@@ -80,8 +80,8 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
     if given != wanted and (read is None or not config.scan.covers(read) or given != {**wanted, "scan": read.size}):
         raise InputError(
             f"--from {name_or_path}: its network {_list(given)} is not that of this training "
-            f"{_list(wanted)}; set scan_spacing, scan_ahead, ppo.map, ppo.encoder, ppo.code and ppo.actor to its own, "
-            "or give another policy"
+            f"{_list(wanted)}; set scan_spacing, scan_ahead, scan_feet, ppo.map, ppo.encoder, ppo.code and ppo.actor "
+            "to its own, or give another policy"
         )
     check_gains(name_or_path, policy.card, config)
     actor = {name: weight.clone() for name, weight in network.state_dict().items()}
@@ -111,7 +111,7 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origi
         )
     given = find_scan(policy.card.observation_size)
     if given is None or given != config.scan:
-        own = "" if given is None else f"; set scan_spacing={given.spacing:g} scan_ahead={given.ahead:g}"
+        own = "" if given is None else f"; set {given.settings}"
         raise InputError(
             f"--from {name_or_path}: it observes {policy.card.observation_size} numbers, this training gives "
             f"{config.scan.observation_size}{own}"
