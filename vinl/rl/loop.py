@@ -158,16 +158,20 @@ class TrainingLoop:
 
     def checkpoint(self) -> None:
         """Write the checkpoint and the policy."""
+        random = _random_state()
         self.folder.save_checkpoint(
             {
                 "algorithm": self.alg.save(),
                 "environment": self.env.save_state(),
                 "iteration": self.current_learning_iteration,
                 "samples": self.samples,
-                "random": _random_state(),
+                "random": random,
             }
         )
         self.export(self.alg.get_policy(), self.samples)
+        _set_random_state(
+            random
+        )  # networks that are built to be written draw weights: when that is, is up to the clock
 
     def train(self, iterations: int, minutes: float | None = None) -> bool:
         """Go on until ``iterations`` are done in all, time is up or an interrupt asks to stop; all of them save.
