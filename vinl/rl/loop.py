@@ -169,9 +169,8 @@ class TrainingLoop:
             }
         )
         self.export(self.alg.get_policy(), self.samples)
-        _set_random_state(
-            random
-        )  # networks that are built to be written draw weights: when that is, is up to the clock
+        # networks that are built to be written draw weights, and when a run saves is up to the clock
+        _set_random_state(random)
 
     def train(self, iterations: int, minutes: float | None = None) -> bool:
         """Go on until ``iterations`` are done in all, time is up or an interrupt asks to stop; all of them save.
