@@ -178,3 +178,21 @@ def test_drift_is_the_error_smoothed_over_half_a_second(fresh):
     measures = fresh.read_measures()
     assert measures["reward/turn_drift"] == pytest.approx(2 * 0.4 / 0.5 * measures["reward/drift"], rel=0.35)
     assert measures["reward/drift"] < -1e-3
+
+
+def test_wide_tracking_terms_tell_large_errors_apart_where_narrow_ones_do_not():
+    errors = jnp.array([0.0, 0.1, 0.3, 0.6])
+    motion = Motion(*(jnp.zeros((4, 3)) for _ in Motion._fields))
+    off = motion._replace(
+        linear=jnp.zeros((4, 3)).at[:, 1].set(errors),
+        angular=jnp.zeros((4, 3)).at[:, 2].set(errors),
+        contacts=Contacts(*(jnp.zeros((4, 4), bool) for _ in Contacts._fields))._replace(trunk=jnp.zeros(4, bool)),
+        air_time=jnp.zeros((4, 4)),
+        landed=jnp.zeros((4, 4), bool),
+        joints=jnp.zeros((4, 12)),
+    )
+    terms = {name: np.asarray(value) for name, value in reward_terms(off, 0.06).items()}
+    for wide, narrow in (("wide_linear_velocity", "linear_velocity"), ("wide_yaw_rate", "yaw_rate")):
+        assert terms[wide][0] == terms[narrow][0] == 1
+        lost, narrow_lost = -np.diff(terms[wide]), -np.diff(terms[narrow])
+        assert lost[2] > lost[1] > lost[0] > 0 and narrow_lost[2] < narrow_lost[1]

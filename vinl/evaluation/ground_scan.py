@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from vinl.robot.observation import STANDARD_SCAN, HeightScan
+from vinl.sensing.detour import DetourConfig, bend_command, keep_out
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
@@ -15,12 +16,12 @@ from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
 
 
-def rasterise_plan(plan: FloorPlan, scan: HeightScan = STANDARD_SCAN) -> HeightField:
+def rasterise_plan(plan: FloorPlan, reach: float = STANDARD_SCAN.reach) -> HeightField:
     """Walls and furniture as heights on the plan's grid; what hangs above the robot leaves the floor free.
 
-    Level ground lies around them, as wide as the scan reaches: none reads a neighbour's grid.
+    Level ground lies around them, as wide as robots look from where they are [m]: none reads a neighbour's grid.
     """
-    rim = int(np.ceil(scan.reach / plan.frame.resolution)) + 1
+    rim = int(np.ceil(reach / plan.frame.resolution)) + 1
     shape = (plan.frame.shape[0] + 2 * rim, plan.frame.shape[1] + 2 * rim)
     r = plan.frame.resolution
     field = flat_field(GridFrame(plan.frame.x0 - rim * r, plan.frame.y0 - rim * r, r, shape))
@@ -40,26 +41,44 @@ class GroundScan:
         plan: walls and furniture.
         blocks: of each episode.
         scan: where to read.
+        detour: how commands are bent; None: not at all.
     """
 
-    def __init__(self, plan: FloorPlan, blocks: Sequence[Blocks], scan: HeightScan = STANDARD_SCAN) -> None:
-        self._scan = scan
-        bare = rasterise_plan(plan, scan)
-        rows, columns = bare.frame.shape
+    def __init__(
+        self,
+        plan: FloorPlan,
+        blocks: Sequence[Blocks],
+        scan: HeightScan = STANDARD_SCAN,
+        detour: DetourConfig | None = None,
+    ) -> None:
+        self._scan, self._detour = scan, detour
+        fields = [rasterise_plan(plan, max(scan.reach, 0.0 if detour is None else detour.reach))]
+        bare, self._shift = fields[0], np.zeros(len(blocks))
         if any(len(b) for b in blocks):
-            heights = np.empty((len(blocks), rows, columns), np.float32)
-            for k, some in enumerate(blocks):
-                field = HeightField(bare.heights.copy(), bare.labels.copy(), bare.frame)
+            fields = [HeightField(bare.heights.copy(), bare.labels.copy(), bare.frame) for _ in blocks]
+            for field, some in zip(fields, blocks, strict=True):
                 raise_boxes(field, some.boxes(), BLOCK)
-                heights[k] = field.heights
-            self._shift = np.arange(len(blocks)) * rows * bare.frame.resolution
-        else:
-            heights, self._shift = bare.heights[None], np.zeros(len(blocks))
-        self._heights = heights.ravel()
-        self._frame = GridFrame(bare.frame.x0, bare.frame.y0, bare.frame.resolution, (len(heights) * rows, columns))
+            self._shift = np.arange(len(blocks)) * bare.frame.shape[0] * bare.frame.resolution
+        self._heights = np.concatenate([field.heights for field in fields]).ravel()
+        self._closed = None if detour is None else _closed(fields, detour)
+        rows, columns = bare.frame.shape
+        self._frame = GridFrame(bare.frame.x0, bare.frame.y0, bare.frame.resolution, (len(fields) * rows, columns))
 
     def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n points"]:
         """Height of the ground [m] under the scan points of every robot."""
+        return scan_ground(np, self._heights, self._frame, self._on_grid(qpos), self._scan)
+
+    def bend(self, qpos: Float[np.ndarray, "n 19"], command: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+        """The commands as the locomotor is given them: with detours, if it was trained with such."""
+        if self._detour is None or self._closed is None:
+            return command
+        return bend_command(np, self._closed, self._frame, self._on_grid(qpos), command, self._detour)
+
+    def _on_grid(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 19"]:
         at = qpos.copy()
         at[:, 1] += self._shift
-        return scan_ground(np, self._heights, self._frame, at, self._scan)
+        return at
+
+
+def _closed(fields: Sequence[HeightField], detour: DetourConfig) -> Bool[np.ndarray, " cells"]:
+    return np.concatenate([keep_out(field, detour.margin) for field in fields]).ravel()

@@ -13,7 +13,7 @@ from vinl.evaluation.ground_scan import GroundScan
 from vinl.evaluation.scene import build_scene
 from vinl.robot.observation import STANDARD_SCAN, HeightScan
 from vinl.sensing.depth import Mesh
-from vinl.sensing.height_scan import scan_ground
+from vinl.sensing.detour import DetourConfig, keep_out
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
@@ -120,12 +120,14 @@ class Ground:
 class FieldScan(GroundScan):
     """Reads the height scan of robots that all walk on one height field."""
 
-    def __init__(self, field: HeightField, scan: HeightScan = STANDARD_SCAN) -> None:
-        self._field, self._scan = field, scan
+    def __init__(
+        self, field: HeightField, scan: HeightScan = STANDARD_SCAN, detour: DetourConfig | None = None
+    ) -> None:
+        self._heights, self._frame, self._scan, self._detour = field.heights, field.frame, scan, detour
+        self._closed = None if detour is None else keep_out(field, detour.margin).ravel()
 
-    def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n points"]:
-        """Height of the ground [m] under the scan points of every robot."""
-        return scan_ground(np, self._field.heights, self._field.frame, qpos, self._scan)
+    def _on_grid(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 19"]:
+        return qpos
 
 
 def build_ground(config: GroundConfig) -> Ground:

@@ -12,6 +12,7 @@ from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.evaluation.eyes import Eyes, open_eyes
 from vinl.evaluation.ground_scan import GroundScan
+from vinl.policies.card import find_detour
 from vinl.policies.policy import Policy
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE, SCANS, find_scan, observe
@@ -30,7 +31,8 @@ class Senses:
 
     Args:
         locomotor: the policy.
-        scan: reads the height scan that the policy observes; None: it observes none.
+        scan: reads the height scan that the policy observes, and bends its commands if it was trained so; None: it
+            observes none.
         eyes: renders depth; needed only by a policy with a camera.
     """
 
@@ -47,7 +49,9 @@ class Senses:
         rows: Sequence[int] | None = None,
     ) -> Float[np.ndarray, "n 12"]:
         """The next actions. ``rows`` are the robots that still live, see ``Eyes.look``; ``actions`` the last ones."""
-        ground = np.zeros((len(qpos), SCAN_SIZE)) if self._scan is None else self._scan.read(qpos)
+        ground = np.zeros((len(qpos), SCAN_SIZE))
+        if self._scan is not None:
+            ground, command = self._scan.read(qpos), self._scan.bend(qpos, command)
         observation = observe(np, qpos, qvel, command, actions, ground)[:, : self._size]
         if self._eyes is None:
             answer = self._locomotor.act(observation)
@@ -59,7 +63,7 @@ class Senses:
 def give_senses(locomotor: Policy, plan: FloorPlan, blocks: Sequence[Blocks], ceiling: float | None = None) -> Senses:
     """The senses of robots in a floor plan, each with its own clutter, see ``open_eyes``."""
     points = find_scan(locomotor.card.observation_size)
-    scan = None if points is None else GroundScan(plan, blocks, points)
+    scan = None if points is None else GroundScan(plan, blocks, points, find_detour(locomotor.card))
     eyes = None if locomotor.camera is None else open_eyes(plan, blocks, locomotor.camera, ceiling)
     return Senses(locomotor, scan, eyes)
 

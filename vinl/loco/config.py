@@ -9,6 +9,7 @@ from vinl.config.errors import InputError
 from vinl.loco.student_config import StudentConfig
 from vinl.robot.aliengo import KD, KP
 from vinl.robot.observation import SCANS, STANDARD_SCAN, HeightScan
+from vinl.sensing.detour import DetourConfig
 from vinl.world.terrain import TerrainConfig
 
 Range = tuple[float, float]
@@ -61,6 +62,8 @@ class RewardConfig:
     Attributes:
         linear_velocity: exp(-error^2 / sigma) of the commanded velocity in the plane.
         yaw_rate: exp(-error^2 / sigma) of the commanded turning rate.
+        wide_linear_velocity, wide_yaw_rate: the same with a width of 0.3, whatever ``sigma`` is: they tell a large
+            error from a larger one.
         vertical_velocity: vertical speed squared.
         roll_pitch_rate: squared rates of roll and pitch.
         torque: squared joint torques.
@@ -86,6 +89,8 @@ class RewardConfig:
 
     linear_velocity: float = 1.0
     yaw_rate: float = 0.5
+    wide_linear_velocity: float = 0.0
+    wide_yaw_rate: float = 0.0
     vertical_velocity: float = -2.0
     roll_pitch_rate: float = -0.05
     torque: float = -1e-5
@@ -289,6 +294,9 @@ class LocoConfig:
         scan_ahead: how far before the middle of the trunk they reach, 0.8 (half a metre before the front feet) or 1.6
             (275 points, or 1029: a block in time to pass it without haste) [m].
         scan_feet: whether they also read it at 35 points about each foot, as the height of the foot above them.
+        detour: bend the commands that actor and critic are given, so that the feet pass beside what the terrain has on
+            their way; rewards hold the robot to the commands as they are. None: they are given as they are. A student
+            learns from a teacher of the same detours, and finds them out itself.
         ppo, anneal: not used by stage 3.
         student: stage 3 alone.
     """
@@ -304,6 +312,7 @@ class LocoConfig:
     scan_spacing: float = STANDARD_SCAN.spacing
     scan_ahead: float = STANDARD_SCAN.ahead
     scan_feet: bool = STANDARD_SCAN.feet
+    detour: DetourConfig | None = None
     terrain: TerrainConfig = field(default_factory=TerrainConfig)
     commands: CommandConfig = field(default_factory=CommandConfig)
     rewards: RewardConfig = field(default_factory=RewardConfig)

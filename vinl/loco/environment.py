@@ -21,6 +21,7 @@ from vinl.loco.state import State, count_steps, first_state, start_body, strip_w
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
 from vinl.robot.observation import CLIP, observe
 from vinl.robot.rotation import rotate_inverse
+from vinl.sensing.detour import bend_command
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.terrain import build_terrain
 
@@ -72,7 +73,8 @@ class LocoEnvironment:
         self.config = config
         self.num_envs = config.num_envs
         self.terrain = build_terrain(config.terrain)
-        self.simulation = Simulation(self.terrain.ground, config.kp, config.kd, self.terrain.blocks)
+        margin = None if config.detour is None else config.detour.margin
+        self.simulation = Simulation(self.terrain.ground, config.kp, config.kd, self.terrain.blocks, margin)
         self.episode_steps = count_steps(config)
         device = jax.devices()[0]
         self._starts = jax.device_put(jnp.asarray(self.terrain.starts, jnp.float32), device)
@@ -137,12 +139,19 @@ class LocoEnvironment:
     def _observations(
         self, ground: Ground, state: State
     ) -> tuple[Float[Array, "n numbers"], Float[Array, "n numbers"]]:
-        """With noise and without. The noise is the state's own, so that a state that is loaded observes the same."""
-        scan = self.config.scan
-        heights = scan_ground(jnp, ground.heights, self.simulation.frame, state.body.qpos, scan)
-        exact = observe(jnp, state.body.qpos, state.body.qvel, state.command, state.action, heights)
+        """With noise and without. The noise is the state's own, so that a state that is loaded observes the same.
+
+        With detours both have the bent commands, but for a student: it is given the command as it is, and has to find
+        the detour out."""
+        scan, detour, body = self.config.scan, self.config.detour, state.body
+        heights = scan_ground(jnp, ground.heights, self.simulation.frame, body.qpos, scan)
+        exact = seen = observe(jnp, body.qpos, body.qvel, state.command, state.action, heights)
+        if detour is not None:
+            command = bend_command(jnp, ground.closed, self.simulation.frame, body.qpos, state.command, detour)
+            exact = observe(jnp, body.qpos, body.qvel, command, state.action, heights)
+            seen = seen if self.config.stage == 3 else exact
         noise = jax.random.uniform(jax.random.fold_in(state.key, 1), exact.shape)
-        return exact + self.config.randomisation.observation_noise * jnp.asarray(scan.noise) * (2 * noise - 1), exact
+        return seen + self.config.randomisation.observation_noise * jnp.asarray(scan.noise) * (2 * noise - 1), exact
 
     def _advance(
         self, ground: Ground, old: State, lost: Lost, given: Float[Array, "n 12"], rewards: dict[str, Any]

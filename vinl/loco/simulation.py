@@ -15,6 +15,7 @@ from scipy import ndimage
 from vinl.robot.aliengo import FOOT_GEOMS, FOOT_RADIUS, SHANK_SPHERES, SUBSTEPS, TRUNK_SPHERES
 from vinl.robot.aliengo import LEGS as LEG_NAMES
 from vinl.robot.model import robot_spec
+from vinl.sensing.detour import keep_out
 from vinl.world.blocks import Blocks
 from vinl.world.clearance import FAR, block_distances, clearance
 from vinl.world.heightfield import BLOCK, WALL, HeightField
@@ -55,6 +56,7 @@ class Ground(NamedTuple):
         distance, top: (rows * columns,) distance from the nearest block and its height [m], for the shanks; one number
             where the ground has no blocks.
         crest: (rows * columns,) height of the highest ground or block within 10 cm [m]; walls do not count.
+        closed: (rows * columns,) where feet should stay out; one cell where no detours are planned.
     """
 
     normalised: Float[Array, " cells"]
@@ -63,6 +65,7 @@ class Ground(NamedTuple):
     distance: Float[Array, " cells"]
     top: Float[Array, " cells"]
     crest: Float[Array, " cells"]
+    closed: Bool[Array, " cells"]
 
 
 class Body(NamedTuple):
@@ -108,6 +111,7 @@ class Simulation:
         kp, kd: joint gains [N m / rad, N m s / rad].
         blocks: those on the ground: the whole length of the shanks is held against them. The three spheres of a shank
             leave gaps through which the edge of a block slips.
+        margin: how far from blocks and walls feet should stay where detours are planned [m]; None: none are.
 
     Attributes:
         ground: the arrays that ``step`` needs.
@@ -115,7 +119,9 @@ class Simulation:
         model: the MuJoCo model.
     """
 
-    def __init__(self, field: HeightField, kp: float, kd: float, blocks: Blocks | None = None) -> None:
+    def __init__(
+        self, field: HeightField, kp: float, kd: float, blocks: Blocks | None = None, margin: float | None = None
+    ) -> None:
         self.frame = field.frame
         rows, columns = field.frame.shape
         low, span = float(field.heights.min()), max(float(np.ptp(field.heights)), 0.1)
@@ -147,10 +153,14 @@ class Simulation:
         if blocks is not None and len(blocks) > 0:
             distance, top = block_distances(field.frame, blocks.boxes())
         near = _near(field, BLOCK) + 2 * _near(field, WALL)
+        closed = np.zeros(1, bool) if margin is None else keep_out(field, margin)
         # committed arrays only: a mixture of committed and uncommitted ones compiles every program twice
         self.ground = jax.device_put(
             Ground(
-                *(jnp.asarray(x.reshape(-1)) for x in (normalised, field.heights, near, distance, top, _crest(field)))
+                *(
+                    jnp.asarray(x.reshape(-1))
+                    for x in (normalised, field.heights, near, distance, top, _crest(field), closed)
+                )
             ),
             jax.devices()[0],
         )

@@ -44,8 +44,8 @@ def describe_student_figures(row: dict[str, float]) -> dict[str, str]:
     }
 
 
-def build_student(config: StudentConfig, teacher: MapActor) -> DepthActor:
-    """A fresh student in front of a teacher's actor."""
+def build_student(config: StudentConfig, teacher: MapActor, detour: bool = False) -> DepthActor:
+    """A fresh student in front of a teacher's actor; ``detour``: which is given bent commands."""
     net, camera, sizes = config.network, config.camera, teacher.arguments
     student = DepthActor(
         vision=net.vision,
@@ -60,6 +60,7 @@ def build_student(config: StudentConfig, teacher: MapActor) -> DepthActor:
         code=sizes["code"],
         actor=sizes["actor"],
         actions=sizes["actions"],
+        detour=detour,
     )
     if net.remember:
         student.memory.spread_memory(net.remember)
@@ -101,7 +102,7 @@ def train_student(
     torch.manual_seed(config.seed)
     torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
     stopwatch = Stopwatch(device)
-    student = build_student(settings, teacher)
+    student = build_student(settings, teacher, config.detour is not None)
     if settings.start and not resume:
         take_over_student(settings.start, student, config)
     environment = LocoEnvironment(config)
@@ -144,4 +145,6 @@ def train_student(
 
 def _teacher_card(name: str, config: LocoConfig, network: dict[str, Any], samples: int, commit: str) -> PolicyCard:
     action = {**describe_action(), "kp": config.kp, "kd": config.kd}
-    return locomotion_card(name, network, action, scan=config.scan, samples=samples, commit=commit)
+    return locomotion_card(
+        name, network, action, scan=config.scan, detour=config.detour, samples=samples, commit=commit
+    )

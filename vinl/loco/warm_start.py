@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from vinl.config.errors import InputError
 from vinl.loco.config import LocoConfig
-from vinl.policies.card import PolicyCard
+from vinl.policies.card import PolicyCard, find_detour
 from vinl.policies.depth_actor import DepthActor
 from vinl.policies.io import find_policy, load_policy
 from vinl.policies.networks import BlindActor, MapActor
@@ -116,6 +116,12 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origi
             f"--from {name_or_path}: it observes {policy.card.observation_size} numbers, this training gives "
             f"{config.scan.observation_size}{own}"
         )
+    bent = find_detour(policy.card)
+    if bent != config.detour:
+        own = "null" if bent is None else str(asdict(bent))
+        raise InputError(
+            f"--from {name_or_path}: commands are bent otherwise here than it knows; set  detour: {own}  in the config"
+        )
     check_gains(name_or_path, policy.card, config)
     return policy.network, find_origin(policy.card, policy.network, critic=False)
 
@@ -133,13 +139,19 @@ def take_over_student(name_or_path: str, student: DepthActor, config: LocoConfig
     """
     policy = load_policy(name_or_path)
     given, wanted = policy.network.describe(), student.describe()
-    if given != wanted:
+    if given not in (wanted, {name: value for name, value in wanted.items() if name != "detour"}):
         raise InputError(
             f"student.start={name_or_path}: its network {_list(given)} is not that of this training {_list(wanted)}; "
             "set student.network and student.camera to its own"
         )
     check_gains(name_or_path, policy.card, config)
-    student.load_state_dict(policy.network.state_dict())
+    weights = policy.network.state_dict()
+    if given != wanted:  # it knows of no detours yet
+        lacking = student.code - len(weights["head.weight"])
+        for name in ("head.weight", "head.bias"):
+            rows = weights[name]
+            weights[name] = torch.cat([rows, rows.new_zeros(lacking, *rows.shape[1:])])
+    student.load_state_dict(weights)
 
 
 _KINDS = {

@@ -12,6 +12,7 @@ from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP
 from vinl.robot.observation import STANDARD_SCAN, HeightScan, describe
+from vinl.sensing.detour import DetourConfig
 
 SCHEMA = 1
 """Version of ``card.json``."""
@@ -94,6 +95,7 @@ def locomotion_card(
     network: dict[str, Any],
     action: dict[str, Any] | None = None,
     scan: HeightScan | None = STANDARD_SCAN,
+    detour: DetourConfig | None = None,
     **rest: Any,
 ) -> PolicyCard:
     """A locomotion card with this robot's observation table and, unless given, action; ``rest`` are further fields.
@@ -104,9 +106,22 @@ def locomotion_card(
         action: scale, default pose and gains.
         scan: the height scan that it observes, one of ``robot.observation.SCANS``; None, as for a policy that sees
             through a camera: none.
+        detour: how its commands are bent before it observes them.
     """
     table = describe()[:-1] if scan is None else describe(scan)
+    if detour is not None:
+        table = [row | {"detour": asdict(detour)} if row["name"] == "command" else row for row in table]
     return PolicyCard("locomotion", name, network, table, action or describe_action(), **rest)
+
+
+def find_detour(card: PolicyCard) -> DetourConfig | None:
+    """How a locomotor's commands are bent before it observes them; None: they are given as they are.
+
+    Raises:
+        InputError: the card asks for a detour that there cannot be.
+    """
+    given = next((row.get("detour") for row in card.observation if row["name"] == "command"), None)
+    return None if given is None else build_config(DetourConfig, given, source=f"{card.name}: detour")
 
 
 PREVIOUS = ("action", "motion", "both")

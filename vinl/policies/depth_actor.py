@@ -10,7 +10,15 @@ from torch import Tensor, nn
 
 from vinl.policies.depth_memory import DepthMemory, State
 from vinl.policies.networks import PolicyNetwork, mlp
-from vinl.robot.observation import PROPRIOCEPTION_SIZE
+from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCALE
+
+DETOUR = 0.1
+"""Unit of a detour in the code [m/s, rad/s]: about as much as one often is, so that it weighs as much as the rest."""
+
+_COMMAND = slice(10, 12)
+"""Sideways speed and yaw rate of the command in the observation table."""
+
+_BEND = tuple(DETOUR * float(scale) for scale in SCALE[_COMMAND])
 
 
 class DepthActor(PolicyNetwork):
@@ -20,7 +28,9 @@ class DepthActor(PolicyNetwork):
 
     Attributes:
         image: height and width that it takes [pixels]; None: it is blind.
-        code: size of the code.
+        detour: whether the teacher's commands were bent (``vinl.sensing.detour``). The code then ends with what has to
+            be added to the command, sideways and turning, in units of ``DETOUR``.
+        code: size of the code, the detour included.
     """
 
     def __init__(
@@ -37,8 +47,10 @@ class DepthActor(PolicyNetwork):
         code: int = 32,
         actor: Sequence[int] = (512, 256, 128),
         actions: int = 12,
+        detour: bool = False,
     ) -> None:
-        """Sizes as in ``DepthMemory``; ``actor`` are the widths of the actor's hidden layers, the teacher's."""
+        """Sizes as in ``DepthMemory``; ``actor`` are the widths of the actor's hidden layers, the teacher's; ``code``
+        is without the detour."""
         super().__init__()
         self.arguments = {
             "vision": vision,
@@ -53,11 +65,13 @@ class DepthActor(PolicyNetwork):
             "code": code,
             "actor": list(actor),
             "actions": actions,
+            **({"detour": True} if detour else {}),  # cards from before there were detours lack it
         }
-        self.observation_size, self.action_size, self.code = proprioception, actions, code
+        self.observation_size, self.action_size, self.detour = proprioception, actions, detour
+        self.code = code + 2 * detour
         self.memory = DepthMemory(vision, height, width, proprioception, visual, hidden, layers, memory, planes)
         self.image = self.memory.image
-        self.head = nn.Linear(hidden, code)
+        self.head = nn.Linear(hidden, self.code)
         self.actor = mlp([proprioception + code, *actor, actions], nn.ELU)
 
     def initial_state(self, n: int, device: torch.device | str | None = None) -> State:
@@ -77,7 +91,16 @@ class DepthActor(PolicyNetwork):
 
     def act(self, vector: Float[Tensor, "*n k"], code: Float[Tensor, "*n code"]) -> Float[Tensor, "*n actions"]:
         """Actions of a code, the student's or the teacher's."""
+        if self.detour:
+            code, bend = code[..., :-2], code[..., -2:] * torch.tensor(_BEND, device=code.device, dtype=code.dtype)
+            before, command, behind = vector.tensor_split((_COMMAND.start, _COMMAND.stop), -1)
+            vector = torch.cat([before, command + bend, behind], -1)
         return self.actor(torch.cat([vector, code], -1))
+
+    @staticmethod
+    def read_detour(vector: Float[Tensor, "n k"], bent: Float[Tensor, "n m"]) -> Float[Tensor, "n 2"]:
+        """The end of the code that leads from one observation's command to that of another."""
+        return (bent[:, _COMMAND] - vector[:, _COMMAND]) / torch.tensor(_BEND, device=vector.device)
 
     def forward(
         self,
