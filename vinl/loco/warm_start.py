@@ -118,10 +118,10 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origi
         )
     bent = find_detour(policy.card)
     if bent != config.detour:
-        own = "null" if bent is None else str(asdict(bent))
-        raise InputError(
-            f"--from {name_or_path}: commands are bent otherwise here than it knows; set  detour: {own}  in the config"
-        )
+        own = "take detour out of the config"
+        if bent is not None:
+            own = "set " + " ".join(f"detour.{name}={value:g}" for name, value in asdict(bent).items())
+        raise InputError(f"--from {name_or_path}: commands are bent otherwise here than it knows; {own}")
     check_gains(name_or_path, policy.card, config)
     return policy.network, find_origin(policy.card, policy.network, critic=False)
 
