@@ -1,7 +1,7 @@
 """Trainings with bent commands: what the policy is given, what rewards hold it to, what a student makes of it."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -14,13 +14,14 @@ from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.config.loader import load_config
 from vinl.evaluation.grounds import FieldScan
-from vinl.evaluation.senses import Senses
+from vinl.evaluation.senses import Senses, check_senses
 from vinl.loco import student, training
 from vinl.loco.config import LocoConfig
 from vinl.loco.environment import LocoEnvironment
 from vinl.loco.warm_start import load_teacher, take_over_student
 from vinl.policies.card import find_detour
 from vinl.policies.depth_actor import DepthActor
+from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.robot.observation import STANDARD_SCAN
 from vinl.sensing.detour import DetourConfig
@@ -157,3 +158,10 @@ def test_a_teacher_of_other_detours_is_refused(trained: str) -> None:
         load_teacher("rough", other)
     with pytest.raises(InputError, match=r"detour\.margin"):
         load_config(LocoConfig, "loco/teacher_detour", ["detour.margin=-1"])
+
+
+def test_a_policy_that_sees_no_ground_cannot_ask_for_detours() -> None:
+    policy = load_policy("loco")
+    rows = [row | {"detour": {}} if row["name"] == "command" else row for row in policy.card.observation]
+    with pytest.raises(InputError, match="observes the height scan"):
+        check_senses(DepthPolicy(policy.network, replace(policy.card, observation=rows)))

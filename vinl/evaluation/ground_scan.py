@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from vinl.robot.observation import STANDARD_SCAN, HeightScan
 from vinl.sensing.detour import DetourConfig, bend_command, keep_out
@@ -51,18 +51,26 @@ class GroundScan:
         scan: HeightScan = STANDARD_SCAN,
         detour: DetourConfig | None = None,
     ) -> None:
-        self._scan, self._detour = scan, detour
-        fields = [rasterise_plan(plan, max(scan.reach, 0.0 if detour is None else detour.reach))]
-        bare, self._shift = fields[0], np.zeros(len(blocks))
-        if any(len(b) for b in blocks):
-            fields = [HeightField(bare.heights.copy(), bare.labels.copy(), bare.frame) for _ in blocks]
-            for field, some in zip(fields, blocks, strict=True):
-                raise_boxes(field, some.boxes(), BLOCK)
-            self._shift = np.arange(len(blocks)) * bare.frame.shape[0] * bare.frame.resolution
-        self._heights = np.concatenate([field.heights for field in fields]).ravel()
-        self._closed = None if detour is None else _closed(fields, detour)
-        rows, columns = bare.frame.shape
-        self._frame = GridFrame(bare.frame.x0, bare.frame.y0, bare.frame.resolution, (len(fields) * rows, columns))
+        bare = rasterise_plan(plan, max(scan.reach, 0.0 if detour is None else detour.reach))
+        if not any(len(b) for b in blocks):
+            self._stack([bare], scan, detour)
+            return
+        fields = [HeightField(bare.heights.copy(), bare.labels.copy(), bare.frame) for _ in blocks]
+        for field, some in zip(fields, blocks, strict=True):
+            raise_boxes(field, some.boxes(), BLOCK)
+        self._stack(fields, scan, detour)
+
+    def _stack(self, fields: Sequence[HeightField], scan: HeightScan, detour: DetourConfig | None) -> None:
+        """One field for each robot, or one for all."""
+        frame = fields[0].frame
+        rows, columns = frame.shape
+        self._scan, self._heights = scan, np.concatenate([field.heights for field in fields]).ravel()
+        self._frame = GridFrame(frame.x0, frame.y0, frame.resolution, (len(fields) * rows, columns))
+        self._shift = np.arange(len(fields)) * rows * frame.resolution
+        self._detour = None
+        if detour is not None:
+            closed = np.concatenate([keep_out(field, detour.margin) for field in fields]).ravel()
+            self._detour = closed, detour
 
     def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n points"]:
         """Height of the ground [m] under the scan points of every robot."""
@@ -70,15 +78,12 @@ class GroundScan:
 
     def bend(self, qpos: Float[np.ndarray, "n 19"], command: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """The commands as the locomotor is given them: with detours, if it was trained with such."""
-        if self._detour is None or self._closed is None:
+        if self._detour is None:
             return command
-        return bend_command(np, self._closed, self._frame, self._on_grid(qpos), command, self._detour)
+        closed, config = self._detour
+        return bend_command(np, closed, self._frame, self._on_grid(qpos), command, config)
 
     def _on_grid(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 19"]:
         at = qpos.copy()
         at[:, 1] += self._shift
         return at
-
-
-def _closed(fields: Sequence[HeightField], detour: DetourConfig) -> Bool[np.ndarray, " cells"]:
-    return np.concatenate([keep_out(field, detour.margin) for field in fields]).ravel()

@@ -13,7 +13,7 @@ from vinl.evaluation.ground_scan import GroundScan
 from vinl.evaluation.scene import build_scene
 from vinl.robot.observation import STANDARD_SCAN, HeightScan
 from vinl.sensing.depth import Mesh
-from vinl.sensing.detour import DetourConfig, keep_out
+from vinl.sensing.detour import DetourConfig
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
@@ -123,11 +123,7 @@ class FieldScan(GroundScan):
     def __init__(
         self, field: HeightField, scan: HeightScan = STANDARD_SCAN, detour: DetourConfig | None = None
     ) -> None:
-        self._heights, self._frame, self._scan, self._detour = field.heights, field.frame, scan, detour
-        self._closed = None if detour is None else keep_out(field, detour.margin).ravel()
-
-    def _on_grid(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 19"]:
-        return qpos
+        self._stack([field], scan, detour)
 
 
 def build_ground(config: GroundConfig) -> Ground:

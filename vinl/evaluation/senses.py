@@ -110,7 +110,8 @@ def check_senses(policy: Policy) -> None:
     """Refuse a policy that is no locomotor, or observes what there is not.
 
     Raises:
-        InputError: it is of another kind, or its table is neither one with a height scan nor proprioception alone.
+        InputError: it is of another kind, its table is neither one with a height scan nor proprioception alone, or its
+            commands are bent as they cannot be.
     """
     card = policy.card
     if card.kind != "locomotion":
@@ -121,3 +122,5 @@ def check_senses(policy: Policy) -> None:
             f"policy {card.name} observes {card.observation_size} numbers; the robot has {PROPRIOCEPTION_SIZE}, or "
             f"{known} with the height scan"
         )
+    if find_detour(card) is not None and card.observation_size == PROPRIOCEPTION_SIZE:
+        raise InputError(f"policy {card.name}: commands are bent only for one that observes the height scan")

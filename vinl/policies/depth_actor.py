@@ -31,7 +31,10 @@ class DepthActor(PolicyNetwork):
         detour: whether the teacher's commands were bent (``vinl.sensing.detour``). The code then ends with what has to
             be added to the command, sideways and turning, in units of ``DETOUR``.
         code: size of the code, the detour included.
+        bend: (2,) what one unit of the detour adds to the observed command.
     """
+
+    bend: Tensor
 
     def __init__(
         self,
@@ -69,6 +72,8 @@ class DepthActor(PolicyNetwork):
         }
         self.observation_size, self.action_size, self.detour = proprioception, actions, detour
         self.code = code + 2 * detour
+        # no weight, but on the device: to copy it there at every step would be to wait for the device
+        self.register_buffer("bend", torch.tensor(_BEND), persistent=False)
         self.memory = DepthMemory(vision, height, width, proprioception, visual, hidden, layers, memory, planes)
         self.image = self.memory.image
         self.head = nn.Linear(hidden, self.code)
@@ -92,15 +97,14 @@ class DepthActor(PolicyNetwork):
     def act(self, vector: Float[Tensor, "*n k"], code: Float[Tensor, "*n code"]) -> Float[Tensor, "*n actions"]:
         """Actions of a code, the student's or the teacher's."""
         if self.detour:
-            code, bend = code[..., :-2], code[..., -2:] * torch.tensor(_BEND, device=code.device, dtype=code.dtype)
+            code, bend = code[..., :-2], code[..., -2:] * self.bend
             before, command, behind = vector.tensor_split((_COMMAND.start, _COMMAND.stop), -1)
             vector = torch.cat([before, command + bend, behind], -1)
         return self.actor(torch.cat([vector, code], -1))
 
-    @staticmethod
-    def read_detour(vector: Float[Tensor, "n k"], bent: Float[Tensor, "n m"]) -> Float[Tensor, "n 2"]:
+    def read_detour(self, vector: Float[Tensor, "n k"], bent: Float[Tensor, "n m"]) -> Float[Tensor, "n 2"]:
         """The end of the code that leads from one observation's command to that of another."""
-        return (bent[:, _COMMAND] - vector[:, _COMMAND]) / torch.tensor(_BEND, device=vector.device)
+        return (bent[:, _COMMAND] - vector[:, _COMMAND]) / self.bend
 
     def forward(
         self,

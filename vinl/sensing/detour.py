@@ -16,7 +16,8 @@ from vinl.world.grid import GridFrame
 from vinl.world.heightfield import GROUND, HeightField
 
 STANCE = np.array([[0.24, 0.157], [0.24, -0.157], [-0.24, 0.157], [-0.24, -0.157]])
-"""(4, 2) where the feet stand about the middle of the trunk [m] [maker's meshes]."""
+"""(4, 2) where feet are taken to stand about the middle of the trunk [m]: below the hips, 0.313 m apart [maker's
+meshes]."""
 
 SIDEWAYS = (-0.3, -0.25, -0.2, -0.15, -0.1, -0.06, -0.03, 0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3)
 """Sideways speeds that a detour may add [m/s]."""
@@ -114,11 +115,11 @@ def plan_detours(xp: Any, closed: Any, frame: GridFrame, qpos: Any, command: Any
         i = xp.rint((y + s * before + c * beside - frame.y0) / frame.resolution)
         row, column = xp.clip(i, 0, rows - 1).astype(xp.int32), xp.clip(j, 0, columns - 1).astype(xp.int32)
         hits = hits + xp.take(closed, row * columns + column, mode="clip")
-    seen = xp.abs(forward) * times <= config.ahead - STANCE[0, 0]  # (n, 1, times)
+    speed = xp.hypot(command[:, :1], command[:, 1:2])
+    seen = speed[..., None] * times <= config.ahead - STANCE[0, 0]  # (n, 1, times)
     effort = offers[:, 0] ** 2 + config.turning * offers[:, 1] ** 2
     cost = xp.sum(seen * (config.price * hits + effort[:, None]), -1)
-    moving = xp.abs(command[:, :1]) > 0
-    return xp.where(moving, offers[xp.argmin(cost, 1)], 0.0)
+    return xp.where(speed > 0, offers[xp.argmin(cost, 1)], 0.0)
 
 
 def bend_command(xp: Any, closed: Any, frame: GridFrame, qpos: Any, command: Any, config: DetourConfig) -> Any:
