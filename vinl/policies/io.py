@@ -77,6 +77,7 @@ def load_policy(name_or_path: str | Path, device: str = "cpu") -> LocomotionPoli
     weights = _read_weights(folder / WEIGHTS_FILE)
     _check_weights(network, weights, folder)
     network.load_state_dict({key: w.to(target, torch.float32) for key, w in weights.items()}, assign=True)
+    network.to(target)  # what is no weight
     return DepthPolicy(network, card) if sees else LocomotionPolicy(network, card)
 
 
