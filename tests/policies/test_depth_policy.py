@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from vinl.config.errors import InputError
 from vinl.evaluation.learned_navigator import LearnedNavigator
 from vinl.policies.card import PolicyCard, locomotion_card, navigation_card
+from vinl.policies.depth_actor import DepthActor
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy, save_policy
 from vinl.policies.networks import MapActor, PolicyNetwork
@@ -103,6 +104,17 @@ def test_it_comes_back_from_its_folder(card: PolicyCard, tmp_path: Path) -> None
     policy = load_policy(folder)
     assert policy.card.kind == "navigation" and policy.camera == CAMERA
     assert LearnedNavigator(policy).camera == CAMERA
+
+
+@pytest.mark.parametrize("detour", [False, True])
+def test_a_student_acts_alike_when_it_comes_back(detour: bool, tmp_path: Path) -> None:
+    torch.manual_seed(0)
+    student = DepthActor(height=18, width=32, visual=8, hidden=8, layers=1, actor=(16,), detour=detour)
+    camera = replace(LOCOMOTION_CAMERA, width=32, height=18)
+    card = locomotion_card("student", student.describe(), scan=None, camera=camera.describe())
+    back = load_policy(save_policy(tmp_path / "student", student, card))
+    seen = np.linspace(-1, 1, 96).reshape(2, 48), np.full((2, 18, 32), 0.5, np.float32)
+    np.testing.assert_array_equal(back.act(*seen), DepthPolicy(student, card).act(*seen))
 
 
 def test_cards_that_do_not_fit(card: PolicyCard, tmp_path: Path) -> None:
