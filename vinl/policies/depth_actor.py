@@ -72,8 +72,8 @@ class DepthActor(PolicyNetwork):
         }
         self.observation_size, self.action_size, self.detour = proprioception, actions, detour
         self.code = code + 2 * detour
-        # No weight, but on the device: to copy it there at every step would be to wait for the device. It has its numbers
-        # even where networks are built without any (``load_policy``).
+        # No weight, but on the device: to copy it there at every step would be to wait for the device. It has its
+        # numbers even where networks are built without any (``load_policy``).
         self.register_buffer("bend", torch.tensor(_BEND, device="cpu"), persistent=False)
         self.memory = DepthMemory(vision, height, width, proprioception, visual, hidden, layers, memory, planes)
         self.image = self.memory.image
