@@ -10,7 +10,9 @@ import torch
 
 from vinl.config.errors import InputError
 from vinl.policies.average import average_policies
+from vinl.policies.card import change_detour, find_detour
 from vinl.policies.io import load_policy, save_policy
+from vinl.sensing.detour import DetourConfig
 
 
 def test_weights_lie_between_and_the_card_names_both(tmp_path) -> None:
@@ -26,6 +28,15 @@ def test_weights_lie_between_and_the_card_names_both(tmp_path) -> None:
     assert card.evaluation == {} and second.card.evaluation
     save_policy(tmp_path / "mean", network, card)
     assert load_policy(tmp_path / "mean").card.training["averaged"] == card.training["averaged"]
+
+
+def test_detours_may_differ_and_the_second_policys_are_kept() -> None:
+    first, second = load_policy("rough"), load_policy("teacher")
+    first.card = change_detour(first.card)
+    second.card = change_detour(second.card, ["turning=1.7"])
+    _, card = average_policies(first, second, 0.5)
+    assert find_detour(card) == DetourConfig(turning=1.7)
+    assert find_detour(average_policies(second, load_policy("rough"), 0.5)[1]) is None
 
 
 def test_neither_policy_is_changed() -> None:

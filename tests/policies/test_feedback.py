@@ -10,11 +10,13 @@ import pytest
 import torch
 
 from vinl.config.errors import InputError
+from vinl.policies.card import find_detour
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.feedback import add_feedback
 from vinl.policies.io import load_policy
 from vinl.policies.policy import LocomotionPolicy
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, STANDARD_SCAN
+from vinl.sensing.detour import DetourConfig
 
 GAINS = np.array([0.5, 0.25, 0.1])
 
@@ -74,14 +76,25 @@ def test_who_has_no_use_for_it_is_refused() -> None:
 
 
 def test_the_script_writes_a_policy_and_refuses_in_one_line(tmp_path: Path) -> None:
-    script = Path(__file__).resolve().parents[2] / "scripts" / "add_feedback.py"
+    script = Path(__file__).resolve().parents[2] / "scripts" / "tune_locomotor.py"
 
     def run(*argv: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run([sys.executable, str(script), *argv], capture_output=True, text=True)
 
-    assert run("teacher", "--forward", "0.4", "--out", str(tmp_path / "quick")).returncode == 0
-    assert load_policy(tmp_path / "quick").card.training["feedback"]["forward"] == 0.4
-    for argv in (("nav",), ("teachr",), ("teacher", "--yaw-rate", "-1")):
+    assert (
+        run("teacher", "--forward", "0.4", "--detour", "turning=1.7", "--out", str(tmp_path / "quick")).returncode == 0
+    )
+    card = load_policy(tmp_path / "quick").card
+    assert card.training["feedback"]["forward"] == 0.4
+    assert find_detour(card) == DetourConfig(turning=1.7)
+    for argv in (
+        ("nav", "--forward", "1"),
+        ("teachr",),
+        ("teacher", "--yaw-rate", "-1"),
+        ("teacher", "--detour", "turnin=1"),
+        ("teacher", "--detour", "price=-1"),
+        ("loco", "--detour"),
+    ):
         refused = run(*argv, "--out", str(tmp_path / "none"))
         assert refused.returncode == 2 and "error:" in refused.stderr and "Traceback" not in refused.stderr
     assert not (tmp_path / "none").exists()

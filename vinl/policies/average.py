@@ -24,7 +24,7 @@ def average_policies(
 
     Args:
         first, second: of one network, observation and action. Their cameras may stand a little apart (the network's
-            image size is the same); the second's is kept.
+            image size is the same), and their commands may be bent otherwise; the second's camera and detour are kept.
         share: of the second, between 0 and 1.
 
     Returns:
@@ -36,7 +36,13 @@ def average_policies(
     if not 0 <= share <= 1:
         raise InputError(f"the share of {second.card.name} must lie between 0 and 1, got {share:g}")
     for what in ("kind", "network", "observation", "action"):
-        if getattr(first.card, what) != getattr(second.card, what):
+        ours, theirs = (
+            [{key: value for key, value in row.items() if key != "detour"} for row in card.observation]
+            if what == "observation"
+            else getattr(card, what)
+            for card in (first.card, second.card)
+        )
+        if ours != theirs:
             raise InputError(f"{first.card.name} and {second.card.name} differ in {what}: they have no mean")
     network, weights = copy.deepcopy(second.network), first.network.state_dict()
     with torch.no_grad():

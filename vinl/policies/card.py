@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -122,6 +123,27 @@ def find_detour(card: PolicyCard) -> DetourConfig | None:
     """
     given = next((row.get("detour") for row in card.observation if row["name"] == "command"), None)
     return None if given is None else build_config(DetourConfig, given, source=f"{card.name}: detour")
+
+
+def change_detour(card: PolicyCard, overrides: Sequence[str] = ()) -> PolicyCard:
+    """The card of a locomotor whose commands are bent as before, or as by default if they were not, but for overrides.
+
+    Args:
+        card: of a locomotor with a height scan: the planner has to know the ground.
+        overrides: such as ``turning=1.7``, fields of ``DetourConfig``.
+
+    Returns:
+        The card, without measurements.
+
+    Raises:
+        InputError: the card is another kind of policy's, or there cannot be such a detour.
+    """
+    if not any(row["name"] == "height_scan" for row in card.observation):
+        raise InputError(f"{card.name} has no height scan: only policies that know the ground have detours")
+    own = asdict(find_detour(card) or DetourConfig())
+    detour = asdict(build_config(DetourConfig, own, overrides, source=f"{card.name}: detour"))
+    table = [row | {"detour": detour} if row["name"] == "command" else row for row in card.observation]
+    return replace(card, observation=table, evaluation={})
 
 
 PREVIOUS = ("action", "motion", "both")

@@ -48,7 +48,7 @@ def add_feedback(
         raise InputError(f"{card.name} has feedback already: {card.training['feedback']}")
     network = copy.deepcopy(policy.network)
     layer = network.get_submodule("actor.0")
-    assert isinstance(layer, nn.Linear)  # both networks of locomotors begin their actor with the table
+    assert isinstance(layer, nn.Linear)  # the actor of every locomotor begins with the table
     commands = _find("command", card)
     with torch.no_grad():
         for axis, (gain, (row, place)) in enumerate(zip(gains, SPEEDS, strict=True)):
