@@ -36,13 +36,7 @@ def average_policies(
     if not 0 <= share <= 1:
         raise InputError(f"the share of {second.card.name} must lie between 0 and 1, got {share:g}")
     for what in ("kind", "network", "observation", "action"):
-        ours, theirs = (
-            [{key: value for key, value in row.items() if key != "detour"} for row in card.observation]
-            if what == "observation"
-            else getattr(card, what)
-            for card in (first.card, second.card)
-        )
-        if ours != theirs:
+        if _read(first.card, what) != _read(second.card, what):
             raise InputError(f"{first.card.name} and {second.card.name} differ in {what}: they have no mean")
     network, weights = copy.deepcopy(second.network), first.network.state_dict()
     with torch.no_grad():
@@ -54,3 +48,10 @@ def average_policies(
     ]
     card = replace(second.card, training=second.card.training | {"averaged": parts}, evaluation={})
     return network, card
+
+
+def _read(card: PolicyCard, what: str) -> object:
+    """A field of the card; of the observation all but how commands are bent, which is no part of the network."""
+    if what != "observation":
+        return getattr(card, what)
+    return [{key: value for key, value in row.items() if key != "detour"} for row in card.observation]
