@@ -2,8 +2,8 @@
 
     python scripts/ship_policy.py runs/nav nav --half --from runs/nav-first --commit HASH
 
-Paths of the machine that trained it stay out of the card: of files of floor plans only the name is kept, and what the
-run started from is named by --from. Measure it afterwards (scripts/measure_policy.py).
+Paths of the machine that trained it stay out of the card: of files of floor plans, and of the policy whose image network
+and memory a student went on from, only the name is kept, and what the run started from is named by --from. Measure it afterwards (scripts/measure_policy.py).
 """
 
 from __future__ import annotations
@@ -27,6 +27,9 @@ def clean(
     if "homes" in training:
         plans = [Path(plan).name for plan in training["homes"].get("plans", ())]
         training["homes"] = training["homes"] | {"plans": plans}
+    if training.get("student"):
+        begun = training["student"].get("start")
+        training["student"] = training["student"] | {"start": begun and Path(begun).name}
     if start is not None:
         training["from_policy"] = start
         if training.get("origin"):
