@@ -2,8 +2,9 @@
 
     python scripts/ship_policy.py runs/nav nav --half --from runs/nav-first --commit HASH
 
-Paths of the machine that trained it stay out of the card: of files of floor plans, and of the policy whose image network
-and memory a student went on from, only the name is kept, and what the run started from is named by --from. Measure it afterwards (scripts/measure_policy.py).
+Paths of the machine that trained it stay out of the card: of files of floor plans, and of the policy that a student's
+image network and memory come from, only the name is kept, and what the run started from is named by --from. Measure it
+afterwards (scripts/measure_policy.py).
 """
 
 from __future__ import annotations
