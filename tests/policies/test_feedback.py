@@ -30,7 +30,7 @@ def told_more(observation: np.ndarray) -> np.ndarray:
 
 
 def test_a_teacher_acts_as_if_the_command_were_larger_by_what_is_missing() -> None:
-    before = load_policy("teacher")
+    before = load_policy("no_pretraining")
     after = LocomotionPolicy(*add_feedback(before, *GAINS))
     observation = np.random.default_rng(0).uniform(-1, 1, (6, STANDARD_SCAN.observation_size))
     np.testing.assert_allclose(after.act(observation), before.act(told_more(observation)), atol=1e-5)
@@ -44,7 +44,8 @@ def test_a_student_does_for_one_and_the_same_code() -> None:
     assert isinstance(before, DepthPolicy)
     network, _ = add_feedback(before, *GAINS)
     vector = np.random.default_rng(1).uniform(-1, 1, (6, PROPRIOCEPTION_SIZE))
-    code = torch.linspace(-1, 1, 6 * 32).reshape(6, 32)
+    code = torch.linspace(-1, 1, 6 * before.network.code).reshape(6, -1)
+    code[:, 32:] = 0.0  # no detours: the gains are for the bent command
     acts = [
         policy.act(torch.as_tensor(numbers, dtype=torch.float32), code).detach().numpy()  # type: ignore[operator]
         for policy, numbers in ((network, vector), (before.network, told_more(vector)))
@@ -53,7 +54,7 @@ def test_a_student_does_for_one_and_the_same_code() -> None:
 
 
 def test_what_moves_as_it_should_is_not_asked_for_more() -> None:
-    before = load_policy("teacher")
+    before = load_policy("no_pretraining")
     after = LocomotionPolicy(*add_feedback(before, *GAINS))
     observation = np.random.default_rng(2).uniform(-1, 1, (6, STANDARD_SCAN.observation_size))
     observation[:, 9:11], observation[:, 11] = observation[:, 0:2], observation[:, 5]
@@ -63,13 +64,13 @@ def test_what_moves_as_it_should_is_not_asked_for_more() -> None:
 @pytest.mark.parametrize("gain", [-0.1, float("nan"), float("inf")])
 def test_gains_are_gains(gain: float) -> None:
     with pytest.raises(InputError, match="finite and not negative"):
-        add_feedback(load_policy("teacher"), 0.0, gain, 0.0)
+        add_feedback(load_policy("no_pretraining"), 0.0, gain, 0.0)
 
 
 def test_who_has_no_use_for_it_is_refused() -> None:
     with pytest.raises(InputError, match="only locomotors"):
         add_feedback(load_policy("nav"), *GAINS)
-    policy = load_policy("teacher")
+    policy = load_policy("no_pretraining")
     policy.card = replace(policy.card, training=policy.card.training | {"feedback": {"forward": 1.0}})
     with pytest.raises(InputError, match="has feedback already"):
         add_feedback(policy, *GAINS)
@@ -82,7 +83,10 @@ def test_the_script_writes_a_policy_and_refuses_in_one_line(tmp_path: Path) -> N
         return subprocess.run([sys.executable, str(script), *argv], capture_output=True, text=True)
 
     assert (
-        run("teacher", "--forward", "0.4", "--detour", "turning=1.7", "--out", str(tmp_path / "quick")).returncode == 0
+        run(
+            "no_pretraining", "--forward", "0.4", "--detour", "turning=1.7", "--out", str(tmp_path / "quick")
+        ).returncode
+        == 0
     )
     card = load_policy(tmp_path / "quick").card
     assert card.training["feedback"]["forward"] == 0.4
@@ -90,9 +94,9 @@ def test_the_script_writes_a_policy_and_refuses_in_one_line(tmp_path: Path) -> N
     for argv in (
         ("nav", "--forward", "1"),
         ("teachr",),
-        ("teacher", "--yaw-rate", "-1"),
-        ("teacher", "--detour", "turnin=1"),
-        ("teacher", "--detour", "price=-1"),
+        ("no_pretraining", "--yaw-rate", "-1"),
+        ("no_pretraining", "--detour", "turnin=1"),
+        ("no_pretraining", "--detour", "price=-1"),
         ("loco", "--detour"),
     ):
         refused = run(*argv, "--out", str(tmp_path / "none"))

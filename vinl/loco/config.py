@@ -295,8 +295,8 @@ class LocoConfig:
             (275 points, or 1029: a block in time to pass it without haste) [m].
         scan_feet: whether they also read it at 35 points about each foot, as the height of the foot above them.
         detour: bend the commands that actor and critic are given, so that the feet pass beside what the terrain has on
-            their way; rewards hold the robot to the commands as they are. None: they are given as they are. A student
-            learns from a teacher of the same detours, and finds them out itself.
+            their way; rewards hold the robot to the commands as they are. None: they are given as they are; in
+            stage 3, where the student has to find them out itself: as the teacher's are.
         ppo, anneal: not used by stage 3.
         student: stage 3 alone.
     """

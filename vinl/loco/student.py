@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import torch
@@ -91,7 +91,8 @@ def train_student(
     source = str(kept) if resume and kept.is_dir() else config.from_policy
     if source is None:
         raise InputError("stage 3 needs a teacher: give --from vinl/teacher, a policy folder or a run of stage 2")
-    teacher, origin = load_teacher(source, config)
+    teacher, origin, detour = load_teacher(source, config)
+    config = replace(config, detour=detour)
     if not resume:
         run.create(dump_config(config))
     if not kept.is_dir():

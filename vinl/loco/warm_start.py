@@ -18,6 +18,7 @@ from vinl.policies.io import find_policy, load_policy
 from vinl.policies.networks import BlindActor, MapActor
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, HeightScan, find_scan
+from vinl.sensing.detour import DetourConfig
 
 
 @dataclass(frozen=True)
@@ -91,16 +92,16 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
     return WarmStart(actor, critic, find_origin(policy.card, network, critic is not None))
 
 
-def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origin]:
-    """The teacher of a student, and where it comes from.
+def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origin, DetourConfig | None]:
+    """The teacher of a student, where it comes from, and how its commands are bent.
 
     Args:
         name_or_path: as for ``load_warm_start``.
-        config: of the student's training.
+        config: of the student's training; with no detour of its own it takes the teacher's.
 
     Raises:
-        InputError: no such policy, one that does not read the height scan of this training, or one with other joint
-            gains.
+        InputError: no such policy, one that does not read the height scan of this training, one with other detours
+            than this training asks for, or one with other joint gains.
     """
     policy = load_policy(name_or_path)
     if not isinstance(policy.network, MapActor):
@@ -117,13 +118,14 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origi
             f"{config.scan.observation_size}{own}"
         )
     bent = find_detour(policy.card)
-    if bent != config.detour:
-        own = "take detour out of the config"
-        if bent is not None:
-            own = "set " + " ".join(f"detour.{name}={value:g}" for name, value in asdict(bent).items())
-        raise InputError(f"--from {name_or_path}: commands are bent otherwise here than it knows; {own}")
+    if config.detour not in (None, bent):
+        own = "none" if bent is None else " ".join(f"detour.{name}={value:g}" for name, value in asdict(bent).items())
+        raise InputError(
+            f"--from {name_or_path}: commands are bent otherwise here than it knows; take detour out of the config, a "
+            f"student has its teacher's ({own})"
+        )
     check_gains(name_or_path, policy.card, config)
-    return policy.network, find_origin(policy.card, policy.network, critic=False)
+    return policy.network, find_origin(policy.card, policy.network, critic=False), bent
 
 
 def take_over_student(name_or_path: str, student: DepthActor, config: LocoConfig) -> None:
