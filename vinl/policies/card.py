@@ -111,7 +111,7 @@ def locomotion_card(
     """
     table = describe()[:-1] if scan is None else describe(scan)
     if detour is not None:
-        table = [row | {"detour": asdict(detour)} if row["name"] == "command" else row for row in table]
+        table = _bend(table, detour)
     return PolicyCard("locomotion", name, network, table, action or describe_action(), **rest)
 
 
@@ -141,9 +141,13 @@ def change_detour(card: PolicyCard, overrides: Sequence[str] = ()) -> PolicyCard
     if not any(row["name"] == "height_scan" for row in card.observation):
         raise InputError(f"{card.name} has no height scan: only policies that know the ground have detours")
     own = asdict(find_detour(card) or DetourConfig())
-    detour = asdict(build_config(DetourConfig, own, overrides, source=f"{card.name}: detour"))
-    table = [row | {"detour": detour} if row["name"] == "command" else row for row in card.observation]
-    return replace(card, observation=table, evaluation={})
+    detour = build_config(DetourConfig, own, overrides, source=f"{card.name}: detour")
+    return replace(card, observation=_bend(card.observation, detour), evaluation={})
+
+
+def _bend(table: Sequence[dict[str, Any]], detour: DetourConfig) -> list[dict[str, Any]]:
+    """The observation table with a detour in its row ``command``."""
+    return [row | {"detour": asdict(detour)} if row["name"] == "command" else row for row in table]
 
 
 PREVIOUS = ("action", "motion", "both")
