@@ -113,9 +113,30 @@ def test_each_collision_set_has_its_shapes():
     assert (spheres.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE).all()
 
 
-def test_touches_the_world_but_not_itself(model):
-    touch = (model.geom_contype[:, None] & model.geom_conaffinity[None]) > 0
-    assert not touch.any()
+def touching_bodies(model: mujoco.MjModel, joints: np.ndarray) -> set[frozenset[str]]:
+    data = mujoco.MjData(model)
+    data.qpos[:] = home_qpos()
+    data.qpos[7:] = joints
+    mujoco.mj_forward(model, data)
+    return {frozenset(model.body(model.geom_bodyid[g]).name for g in pair) for pair in data.contact.geom}
+
+
+def test_legs_touch_each_other_and_neighbouring_links_never_do():
+    model = robot_spec("primitives").compile()
+    low, high = model.jnt_range[1:].T
+    assert touching_bodies(model, DEFAULT_POSE) == set()
+    crossed = DEFAULT_POSE.copy()
+    crossed[[0, 3]] = -0.5, 0.5  # both front legs swing inwards
+    assert frozenset({"FL_calf", "FR_calf"}) in touching_bodies(model, crossed)
+    rng = np.random.default_rng(0)
+    met = set().union(*(touching_bodies(model, rng.uniform(low, high)) for _ in range(1000)))
+    joined = {frozenset({model.body(k).name, model.body(model.body_parentid[k]).name}) for k in range(2, model.nbody)}
+    assert len(met) > 10 and not met & joined and all(len(pair) == 2 for pair in met)
+
+
+def test_spheres_touch_the_world_alone():
+    model = robot_spec("spheres").compile()
+    assert not (model.geom_contype[:, None] & model.geom_conaffinity[None]).any()
     assert (model.geom_conaffinity == 1).all()
 
 

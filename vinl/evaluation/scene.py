@@ -13,8 +13,9 @@ from vinl.world.heightfield import HeightField
 WALLS, BLOCKS, GROUND = "walls", "blocks", "ground"
 """Names of the static bodies of walls (with furniture) and blocks, and of the ground's geom."""
 
-TOUCH_SENSORS = ("touch_blocks", "touch_walls", "touch_ground")
-"""One number each, the contacts of the whole robot with blocks and walls, and of the trunk with the ground."""
+TOUCH_SENSORS = ("touch_blocks", "touch_walls", "touch_ground", "touch_self")
+"""One number each, the contacts of the whole robot with blocks and walls, of the trunk with the ground, and of the
+robot with itself."""
 
 FORCE_SENSORS = tuple(f"force_{foot}" for foot in FOOT_GEOMS)
 """Three numbers each, the net contact force on a foot in the world frame [N], up to its sign."""
@@ -23,7 +24,7 @@ _FOUND = 1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND)
 _FORCE = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE)
 _ANY, _NET_FORCE = 0, 3
 _SOLID = {"contype": 1, "conaffinity": 0}
-"""The robot's geoms have it the other way round: they touch the world, never each other."""
+"""See ``robot.model`` for the robot's own."""
 
 
 def build_scene(
@@ -59,6 +60,7 @@ def build_scene(
         (TOUCH_SENSORS[0], kind.mjOBJ_XBODY, "trunk", kind.mjOBJ_BODY, BLOCKS),
         (TOUCH_SENSORS[1], kind.mjOBJ_XBODY, "trunk", kind.mjOBJ_BODY, WALLS),
         (TOUCH_SENSORS[2], kind.mjOBJ_GEOM, "trunk", kind.mjOBJ_GEOM, GROUND),
+        (TOUCH_SENSORS[3], kind.mjOBJ_XBODY, "trunk", kind.mjOBJ_XBODY, "trunk"),
     ):
         _add_contact_sensor(spec, sensor, first, name, second, other, _FOUND, _ANY)
     for sensor, foot in zip(FORCE_SENSORS, FOOT_GEOMS, strict=True):

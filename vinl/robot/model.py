@@ -13,6 +13,9 @@ from vinl.robot.aliengo import KD, KP, PHYSICS_DT
 CollisionSet = Literal["spheres", "primitives"]
 _GROUP = {"spheres": 3, "primitives": 4}
 _VISUAL_GROUP = 2
+_FOOT_GROUP = 1
+_CONTYPE, _CONAFFINITY = 2, 3
+"""Of geoms that touch each other and the world, whose geoms have ``contype`` 1 and ``conaffinity`` 0."""
 
 
 def mjcf_path() -> Path:
@@ -31,7 +34,8 @@ def robot_spec(collision: CollisionSet, visual: bool = False, kp: float = KP, kd
 
     Returns:
         A spec with the solver settings of the collision set: one Newton iteration with Euler for the spheres (fast,
-        stable only with eulerdamp off), converged elliptic contacts for the primitives.
+        stable only with eulerdamp off), converged elliptic contacts for the primitives. With the primitives, legs touch
+        each other and the trunk; a link and the one that it is jointed to never do. With the spheres none do.
     """
     spec = mujoco.MjSpec.from_file(str(mjcf_path()))
     unwanted = {group for name, group in _GROUP.items() if name != collision}
@@ -57,4 +61,7 @@ def robot_spec(collision: CollisionSet, visual: bool = False, kp: float = KP, kd
         option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         option.impratio = 10
         option.iterations, option.ls_iterations = 50, 50
+        for geom in spec.geoms:
+            if geom.group in (_FOOT_GROUP, _GROUP[collision]):
+                geom.contype, geom.conaffinity = _CONTYPE, _CONAFFINITY
     return spec
