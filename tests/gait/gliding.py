@@ -1,0 +1,67 @@
+"""Robots without dynamics: the trunk glides, the feet are where the gait wants them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vinl.gait.config import GaitConfig
+from vinl.gait.footholds import plan_footholds
+from vinl.gait.ground_view import FieldView, build_ground_map
+from vinl.gait.leg import knee_from_foot
+from vinl.gait.path import swing_path
+from vinl.gait.state import aim, stance_places, start_gait, swings, tick
+from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS
+from vinl.robot.kinematics import HIPS
+from vinl.world.boxes import Boxes
+from vinl.world.grid import GridFrame
+from vinl.world.heightfield import BLOCK, flat_field, raise_boxes
+
+_SHANK_RADIUS = 0.0145
+_LONGEST = 0.488
+
+
+class Glide(NamedTuple):
+    """(n,) what each robot touched on its way over the bar, and whether its legs were long enough for it."""
+
+    foot: np.ndarray
+    shank: np.ndarray
+    in_reach: np.ndarray
+
+
+def glide(config: GaitConfig, height: float, speed: float, robots: int, depth: float = 0.2) -> Glide:
+    """Robots that start half a stride and more apart glide over a bar across their path."""
+    n, z = robots, config.hip_height
+    frame = GridFrame(-4.0, -1.0, 0.05, (41, 181))
+    bar, field = Boxes(np.array([[0.0, 0.0, 0.0, depth, 2.0, 0.0, height]])), flat_field(frame)
+    raise_boxes(field, bar, BLOCK)
+    ground = build_ground_map(field.heights, frame, bar)
+    qpos, command = np.zeros((n, 7)), np.zeros((n, 3))
+    qpos[:, 0], qpos[:, 2], qpos[:, 3] = -2.2 - np.linspace(0, 0.6, n), z, 1.0
+    command[:, 0] = speed
+    velocity, motion = command[:, :2].copy(), np.zeros((n, 4))
+    motion[:, 0] = speed * CONTROL_DT
+    places = np.broadcast_to(stance_places(config), (n, 4, 2))
+    feet = np.concatenate([places, np.full((n, 4, 1), FOOT_RADIUS - z)], -1).astype(float)
+    gait = start_gait(np, config, feet)
+    foot, shank, in_reach = np.zeros(n, bool), np.zeros(n, bool), np.ones(n, bool)
+    for _ in range(round(4.0 / speed / CONTROL_DT)):
+        qpos[:, :1] += motion[:, :1]
+        feet[..., 0] -= motion[:, :1]
+        gait = tick(np, config, gait, motion, command, feet)
+        view = FieldView(np, ground, frame, qpos)
+        gait = aim(
+            np, config, gait, plan_footholds(np, config, view, gait, velocity, command, feet), velocity, command, feet
+        )
+        feet = swing_path(np, config, gait, feet)
+        feet[..., 2] = np.where(swings(np, config, gait), feet[..., 2], FOOT_RADIUS - z)
+        ahead = feet[..., 0] - HIPS[:, 0]
+        near = np.abs(qpos[:, 0]) < 1.1
+        in_reach &= ~near | (np.hypot(ahead, feet[..., 2]) < _LONGEST).all(1)
+        foot |= (view.clearance(feet) < FOOT_RADIUS - 0.002).any(1)
+        back, up = knee_from_foot(np, ahead, -feet[..., 2])
+        line = np.linspace(0.1, 1.0, 8)[:, None, None]
+        points = np.stack(np.broadcast_arrays(feet[..., 0] + line * back, feet[..., 1], feet[..., 2] + line * up), -1)
+        shank |= (view.clearance(np.moveaxis(points, 0, 2)) < _SHANK_RADIUS).any((1, 2))
+    return Glide(foot, shank, in_reach)

@@ -1,0 +1,1 @@
+"""Gait clock, footholds chosen on a map, and swing paths: one planner for training, evaluation and robot."""

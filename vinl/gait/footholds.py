@@ -1,0 +1,205 @@
+"""Footholds chosen on a map: the cheapest place near Raibert's that neither foot nor shank would touch a block from.
+
+For numpy and jax.numpy alike (``xp``).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vinl.gait.clock import constant, unison
+from vinl.gait.config import GaitConfig
+from vinl.gait.ground_view import GroundView
+from vinl.gait.leg import SHANK_FRACTIONS, farthest, knee_from_foot
+from vinl.gait.state import (
+    GaitState,
+    Plan,
+    raibert,
+    raibert_at,
+    stance_places,
+    stance_time,
+    swings,
+    time_to_touch_down,
+    turn,
+)
+from vinl.robot.aliengo import FOOT_RADIUS
+from vinl.robot.kinematics import HIPS
+
+ALONG = np.arange(-6, 7) * 0.055
+"""(13,) offsets of candidates from Raibert's foothold, along the heading [m]."""
+
+ACROSS = np.arange(-2, 3) * 0.06
+"""(5,) the same across it, to the left [m]."""
+
+CANDIDATES = np.stack(np.meshgrid(ALONG, ACROSS, indexing="ij"), -1).reshape(-1, 2).astype(np.float32)
+"""(65, 2) all of them."""
+
+_WIDTH = (0.15, 0.10)
+"""Offsets along and across that cost 1 [m]."""
+
+_INWARD = 0.05, 0.03
+"""A foothold this much nearer to the other side's feet is free; farther in, so much more costs 1 [m]."""
+
+_BLOCKED, _DEEP = (30.0, 12.0), (300.0, 200.0)
+"""What a foothold costs whose foot, whose shank is too near to a block, and each metre that it is."""
+
+_OUT_OF_REACH = 300.0
+"""What each metre beyond the leg's reach costs."""
+
+_CHANGE = 60.0
+"""What a swinging foot's change of its foothold costs, each m^2 [1/m^2], up to 0.2 m."""
+
+PATH = np.linspace(0.0, 1.0, 9, dtype=np.float32)
+"""(9,) places on the way from lift-off to touch-down at which the map is read for the apex."""
+
+
+def plan_footholds(
+    xp: Any, config: GaitConfig, view: GroundView | None, gait: GaitState, velocity: Any, command: Any, feet: Any
+) -> Plan:
+    """Choose a foothold, an apex and the clock's rate for every robot.
+
+    Args:
+        xp: ``numpy`` or ``jax.numpy``.
+        config: of the gait.
+        view: the ground; None: level, and nothing on it.
+        gait: after ``state.tick``.
+        velocity: (n, 2) of the trunk in the heading frame [m/s].
+        command: (n, 3) forward, left [m/s], yaw rate [rad/s].
+        feet: (n, 4, 3) middles of the feet in the heading frame [m].
+    """
+    level = 0 * feet[..., 2]
+    if view is None or not config.map:
+        return Plan(xp.stack([level, level], -1), level, level + config.lift, level + 1.0)
+    swinging = swings(xp, config, gait)
+    nominal, heading = raibert(xp, config, gait, velocity, command)
+    candidates = constant(xp, CANDIDATES, level)
+    points = nominal[:, :, None] + turn(xp, heading[..., None], candidates[None, None])
+    cost = obstruction(xp, config, view, gait, command, points, heading, candidates[:, 0])
+    side = constant(xp, np.sign(stance_places(config)[:, 1]), level)[:, None]
+    inward = xp.clip(-candidates[:, 1] * side - _INWARD[0], 0.0, None) / _INWARD[1]
+    cost = cost + ((candidates[:, 0] / _WIDTH[0]) ** 2 + (candidates[:, 1] / _WIDTH[1]) ** 2 + inward**2)
+    moved = xp.sum((points - gait.target[:, :, None, :2]) ** 2, -1)
+    cost = cost + xp.where(swinging[..., None], _CHANGE * xp.clip(moved, 0.0, 0.04), 0.0)
+    best = xp.argmin(cost, -1)[..., None]
+    chosen = xp.take_along_axis(points, best[..., None], 2)[:, :, 0]
+    offset = xp.take_along_axis(xp.broadcast_to(candidates, points.shape), best[..., None], 2)[:, :, 0]
+
+    start = xp.where(swinging[..., None], gait.lift, feet)
+    base = start[..., 2]
+    rise = view.height(chosen) + FOOT_RADIUS - base
+    way = start[..., None, :2] + (chosen - start[..., :2])[..., None, :] * constant(xp, PATH, level)[:, None]
+    over = xp.max(view.crest(way), -1) + FOOT_RADIUS - base
+    apex = xp.maximum(over, xp.clip(rise, 0.0, None)) + config.lift
+    return Plan(offset, rise, apex, choose_rates(xp, config, view, gait, command))
+
+
+def obstruction(
+    xp: Any,
+    config: GaitConfig,
+    view: GroundView,
+    gait: GaitState,
+    command: Any,
+    points: Any,
+    heading: Any,
+    along: Any,
+) -> Any:
+    """What blocks and the leg's reach cost at footholds.
+
+    The leg is held against the blocks as it is at touch-down and at lift-off: foot, and points along the shank.
+
+    Args:
+        xp, config, view, gait, command: as for ``plan_footholds``.
+        points: (n, 4, k, 2) footholds in the heading frame [m].
+        heading: (n, 4) of the trunk then [rad].
+        along: (k,) how far ahead of Raibert's footholds they are [m].
+
+    Returns:
+        (n, 4, k), 0 where nothing is in the way.
+    """
+    ground = view.height(points) + FOOT_RADIUS
+    cost = _price(xp, FOOT_RADIUS + config.edge - view.clearance(xp.concatenate([points, ground[..., None]], -1)), 0)
+    sweep = command[:, 0] * stance_time(xp, config, gait)
+    stance = constant(xp, stance_places(config)[:, 0] - HIPS[:, 0].astype(np.float32), along)
+    touch_down = (stance + sweep[:, None] / 2)[..., None] + along
+    hip = along * 0 + (config.hip_height - FOOT_RADIUS)
+    worst = 0.0
+    reach = farthest(xp, hip)
+    for ahead in (touch_down, touch_down - sweep[:, None, None]):
+        back, up = knee_from_foot(xp, ahead, hip)
+        for part in SHANK_FRACTIONS:
+            place = points + turn(xp, heading[..., None], xp.stack([part * back, 0 * back], -1))
+            at = xp.concatenate([place, (ground + part * up)[..., None]], -1)
+            worst = xp.maximum(worst, _price(xp, config.shank - view.clearance(at), 1))
+        cost = cost + _OUT_OF_REACH * xp.clip(xp.abs(ahead) - reach, 0.0, None)
+    return cost + worst
+
+
+def _price(xp: Any, lack: Any, kind: int) -> Any:
+    return xp.where(lack > 0, _BLOCKED[kind] + _DEEP[kind] * lack, 0.0)
+
+
+# ---- the clocks' rates -----------------------------------------------------------------------------------------------
+
+RATES = 7
+"""How many rates are looked at."""
+
+TRACK = np.arange(-6, 25) * 0.055
+"""(31,) places along each foot's track that are looked at, from its next foothold at the present rate [m]."""
+
+_STEPS = 2
+"""How many footholds of each foot ahead its rate is chosen by."""
+
+_LEAST_SPEED = 0.15
+"""Below this the rates stay 1 [m/s]: footholds hardly move with them."""
+
+_RELAX = 0.2
+"""Fraction of the way to the chosen rate that a leg's rate goes in a control step."""
+
+_APART = 0.12
+"""Phase by which a leg may leave the trot at a cost of 1."""
+
+_LEANS = (-0.165, 0.0, 0.165)
+"""Offsets from Raibert's footholds for which a track is looked at [m]: the farther ahead of the hip a foot comes down,
+the farther back its shank leans."""
+
+
+def choose_rates(xp: Any, config: GaitConfig, view: GroundView, gait: GaitState, command: Any) -> Any:
+    """(n, 4) the rates at which the next footholds of every foot ask for the smallest offsets.
+
+    Each foot's track is looked at once; what a foothold would cost whose Raibert place is at any of its places follows
+    from it, and with that the cost of every rate. Legs that leave the trot are drawn back to it.
+    """
+    if config.modulate == 0:
+        return 0 * gait.rate + 1.0
+    left = time_to_touch_down(xp, config, gait)
+    first, heading = raibert_at(xp, config, gait, command[:, :2], command, left)
+    track = constant(xp, TRACK.astype(np.float32), first)
+    speed = xp.sqrt(command[:, 0] ** 2 + command[:, 1] ** 2)
+    course = command[:, :2] / xp.clip(speed, _LEAST_SPEED, None)[:, None]
+    direction = turn(xp, heading, course[:, None] + 0 * first)
+    places = first[:, :, None] + direction[:, :, None] * track[:, None]
+    blocked = [obstruction(xp, config, view, gait, command, places, heading, 0 * track + lean) for lean in _LEANS]
+    spread = len(ALONG) // 2
+    padded = [xp.concatenate([b[..., :1]] * spread + [b] + [b[..., -1:]] * spread, -1) for b in blocked]
+    windows = []
+    for k, shift in enumerate(ALONG):
+        nearest = int(np.abs(np.array(_LEANS) - shift).argmin())
+        windows.append(padded[nearest][..., k : k + len(TRACK)] + float((shift / _WIDTH[0]) ** 2))
+    cost = xp.min(xp.stack(windows, -1), -1)  # (n, 4, track)
+
+    rates = constant(xp, np.linspace(1 - config.modulate, 1 + config.modulate, RATES, dtype=np.float32), first)
+    later = left[..., None] * gait.rate[..., None] / rates  # (n, 4, rates) until the foot comes down
+    apart = unison(xp, gait.phases)[..., None] + (rates - 1.0) * left[..., None] / gait.period[:, None, None]
+    total = 0.1 * ((rates - 1) / config.modulate) ** 2 + (apart / _APART) ** 2
+    for k in range(_STEPS):
+        at = (later + k * gait.period[:, None, None] - left[..., None]) * speed[:, None, None]
+        index = xp.clip((at - float(TRACK[0])) / float(TRACK[1] - TRACK[0]), 0, len(TRACK) - 1.001)
+        below = xp.floor(index)
+        part, low = index - below, below.astype("int32")
+        read = xp.take_along_axis(cost, low, 2) * (1 - part) + xp.take_along_axis(cost, low + 1, 2) * part
+        total = total + xp.clip(read, 0.0, 20.0)
+    best = xp.take(rates, xp.argmin(total, -1))
+    wanted = xp.where((speed > _LEAST_SPEED)[:, None], best, 1.0 + 0 * best)
+    return gait.rate + _RELAX * (wanted - gait.rate)

@@ -1,0 +1,75 @@
+"""The path of a swinging foot, and what a policy is told of the gait. For numpy, jax.numpy and torch (``xp``)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from vinl.gait.clock import swing_fraction
+from vinl.gait.config import GaitConfig
+from vinl.gait.state import GaitState
+from vinl.robot.aliengo import CONTROL_DT
+
+_WAIT = 0.08
+"""At both ends of a swing the foot moves up or down alone, for this fraction of it: the shank follows the foot."""
+
+_STEEP = 0.6
+"""The height of the path is sin(pi s) to this power: at a tenth of the swing it is at half of its apex."""
+
+GAIT_TERMS: tuple[tuple[str, int, float, str], ...] = (
+    ("path_error", 12, 10.0, "m"),
+    ("foothold", 8, 3.0, "m"),
+    ("apex", 4, 5.0, "m"),
+    ("leg_phase", 8, 1.0, "sine, cosine"),
+    ("swing", 4, 1.0, "1"),
+)
+"""Name, size, scale and unit of what ``gait_rows`` gives, in its order: from each foot to the next point of its path
+(x, y, z), to its foothold (x, y) and to the height of its apex, all in the heading frame; its phase; whether it
+swings."""
+
+GAIT_SIZE = sum(size for _, size, _, _ in GAIT_TERMS)
+
+
+def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: float = 0.0) -> Any:
+    """Where each foot should be.
+
+    Args:
+        xp: ``numpy``, ``jax.numpy`` or ``torch``.
+        config, gait: of the robots.
+        feet: (n, 4, 3) middles of the feet in the heading frame [m]; a foot that stands should be where it is.
+        later: how far ahead on the path to look [s].
+
+    Returns:
+        (n, 4, 3) [m].
+    """
+    phases, fraction = gait.phases, swing_fraction(xp, config, gait.period)[:, None]
+    s = xp.clip((phases + later * gait.rate / gait.period[:, None]) / fraction, 0.0, 1.0)
+    forth = xp.clip((s - _WAIT) / (1 - 2 * _WAIT), 0.0, 1.0)
+    forth = (0.5 - 0.5 * xp.cos(math.pi * forth))[..., None]
+    straight = gait.lift + (gait.target - gait.lift) * forth
+    bell = (xp.sin(math.pi * s) + 1e-6) ** _STEEP  # s = 1 gives a sine just below 0 in float32
+    height = straight[..., 2] + (gait.apex - straight[..., 2]) * bell
+    path = xp.concatenate([straight[..., :2], height[..., None]], -1)
+    return xp.where((phases < fraction)[..., None], path, feet)
+
+
+def gait_rows(xp: Any, config: GaitConfig, gait: GaitState, feet: Any) -> Any:
+    """(n, GAIT_SIZE) what a policy observes of its gait, in SI units, in the order of ``GAIT_TERMS``.
+
+    Args:
+        xp, config, gait, feet: as for ``swing_path``.
+    """
+    n = feet.shape[0]
+    phases = gait.phases
+    swinging = phases < swing_fraction(xp, config, gait.period)[:, None]
+    error = swing_path(xp, config, gait, feet, CONTROL_DT) - feet
+    apex = xp.where(swinging, gait.apex - feet[..., 2], 0 * feet[..., 2])
+    angle = 2 * math.pi * phases
+    parts = [
+        xp.clip(error, -0.5, 0.5).reshape(n, 12),
+        xp.clip((gait.target - feet)[..., :2], -1.0, 1.0).reshape(n, 8),
+        xp.clip(apex, -0.5, 0.5),
+        xp.stack([xp.sin(angle), xp.cos(angle)], -1).reshape(n, 8),
+        xp.where(swinging, 1.0 + 0 * apex, 0 * apex),
+    ]
+    return xp.concatenate(parts, -1)
