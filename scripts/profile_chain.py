@@ -122,7 +122,7 @@ def untrained_locomotor() -> DepthPolicy:
     camera = Camera(
         "locomotion", LOCOMOTION_CAMERA.position, seen.pitch_down, seen.hfov, seen.width, seen.height, seen.far
     )
-    return DepthPolicy(actor, locomotion_card("untrained", actor.describe(), scan=None, camera=camera.describe()))
+    return DepthPolicy(actor, locomotion_card("untrained", actor.describe(), scan=False, camera=camera.describe()))
 
 
 def untrained_navigator() -> DepthPolicy:

@@ -29,7 +29,7 @@ def student() -> DepthPolicy:
     torch.manual_seed(0)
     network = DepthActor()
     camera = LOCOMOTION_CAMERA.describe()
-    return DepthPolicy(network, locomotion_card("student", network.describe(), scan=None, camera=camera))
+    return DepthPolicy(network, locomotion_card("student", network.describe(), scan=False, camera=camera))
 
 
 @pytest.fixture(scope="module")

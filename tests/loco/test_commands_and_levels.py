@@ -27,18 +27,6 @@ def test_commands_keep_to_their_ranges_and_shares():
     assert spinning >= config.turn_share - 0.02
 
 
-def test_a_share_of_the_commands_leads_back():
-    config = CommandConfig(forward=(0.0, 1.0), left=(0.0, 0.0), back=(-0.4, -0.2), back_share=0.2)
-    u = np.random.default_rng(0).uniform(size=(4000, DRAWS))
-    command = np.asarray(draw_commands(config, jnp.asarray(u, jnp.float32))[0])
-    back = command[:, 0] < 0
-    assert back.mean() == pytest.approx(0.2, abs=0.02)
-    assert command[back, 0].min() >= -0.4 - 1e-6 and command[back, 0].max() <= -0.2 + 1e-6
-    assert (command == 0).all(1).mean() == pytest.approx(config.stand_share, abs=0.02)
-    with pytest.raises(InputError, match="back_share"):
-        CommandConfig(back_share=0.9)
-
-
 def level_after(way, commanded, *, fallen=False, life=1.0, level=4, u=0.5):
     one = [jnp.array([x]) for x in (level, not fallen, fallen, float(way), float(commanded), float(life), float(u))]
     return int(next_levels(CurriculumConfig(promote=0.75, demote=0.5), 10, *one)[0])
@@ -63,12 +51,12 @@ def test_robots_beyond_the_last_level_go_to_any(u):
 
 
 def test_settings_move_between_their_bounds():
-    anneal = AnnealConfig(begin=0.5, end=0.9, rewards={"sigma": 0.1, "velocity_error": -2.0}, entropy=0.0)
+    anneal = AnnealConfig(begin=0.5, end=0.9, rewards={"sigma": 0.1, "fall": -2.0}, entropy=0.0)
     first = RewardConfig(collision=-3.0)
     assert anneal.rewards_at(0.3, first) == first
     half = anneal.rewards_at(0.7, first)
-    assert (half.sigma, half.velocity_error) == pytest.approx((0.175, -1.0))
-    assert anneal.rewards_at(1.0, first) == RewardConfig(collision=-3.0, sigma=0.1, velocity_error=-2.0)
+    assert (half.sigma, half.fall) == pytest.approx((0.175, -1.0))
+    assert anneal.rewards_at(1.0, first) == RewardConfig(collision=-3.0, sigma=0.1, fall=-2.0)
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ CAMERA = CameraConfig(width=16, height=16).record()
 @pytest.fixture(scope="module")
 def terrain() -> Terrain:
     nothing = {"slope": 0.0, "rough_slope": 0.0, "stairs_up": 0.0, "stairs_down": 0.0, "discrete": 0.0}
-    return build_terrain(TerrainConfig(**nothing, blocks=1.0, levels=2, columns=1, joined=0.2))
+    return build_terrain(TerrainConfig(**nothing, blocks=1.0, levels=2, columns=1))
 
 
 @pytest.fixture(scope="module")

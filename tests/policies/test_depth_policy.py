@@ -46,7 +46,7 @@ class CountingEye(PolicyNetwork):
 
 @pytest.fixture
 def card() -> PolicyCard:
-    return locomotion_card("eye", CountingEye().describe(), scan=None, camera=CAMERA.describe())
+    return locomotion_card("eye", CountingEye().describe(), scan=False, camera=CAMERA.describe())
 
 
 def observe(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -111,7 +111,7 @@ def test_a_student_acts_alike_when_it_comes_back(detour: bool, tmp_path: Path) -
     torch.manual_seed(0)
     student = DepthActor(height=18, width=32, visual=8, hidden=8, layers=1, actor=(16,), detour=detour)
     camera = replace(LOCOMOTION_CAMERA, width=32, height=18)
-    card = locomotion_card("student", student.describe(), scan=None, camera=camera.describe())
+    card = locomotion_card("student", student.describe(), scan=False, camera=camera.describe())
     back = load_policy(save_policy(tmp_path / "student", student, card))
     seen = np.linspace(-1, 1, 96).reshape(2, 48), np.full((2, 18, 32), 0.5, np.float32)
     np.testing.assert_array_equal(back.act(*seen), DepthPolicy(student, card).act(*seen))

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from vinl.robot.aliengo import home_qpos
-from vinl.robot.kinematics import foot_positions
-from vinl.robot.observation import FOOT_POINTS, SCAN_POINTS, SCANS, STANDARD_SCAN, HeightScan
+from vinl.robot.observation import SCAN_POINTS
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.grid import GridFrame
 
@@ -55,28 +54,6 @@ def test_off_the_grid_reads_the_edge():
     far = np.array([home_qpos(1e7, 1e7), home_qpos(-1e12, -1e12)])
     scan = scan_ground(np, heights, FRAME, far)
     assert (scan[0] == 7.0).all() and (scan[1] == 0.0).all()
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("other", SCANS[1:], ids=str)
-def test_other_scans_read_what_the_standard_one_reads(other: HeightScan, dtype: type):
-    heights, qpos = np.random.default_rng(0).random(FRAME.shape), poses(50).astype(dtype)
-    scan = scan_ground(np, heights, FRAME, qpos, other)
-    assert (scan[:, other.places_of(STANDARD_SCAN)] == scan_ground(np, heights, FRAME, qpos)).all()
-
-
-def test_points_about_the_feet_are_read_where_the_feet_are():
-    scan, (x, y) = HeightScan(0.1, feet=True), np.meshgrid(*FRAME.centres())
-    plane, qpos = 0.3 * x - 0.2 * y, poses(30)
-    qpos[:, :2] *= 0.5
-    qpos[:, 7:] += np.random.default_rng(1).normal(0, 0.2, (30, 12))
-    yaw, feet = 2 * np.arctan2(qpos[:, 6], qpos[:, 3]), foot_positions(np, qpos)
-    c, s = np.cos(yaw)[:, None, None], np.sin(yaw)[:, None, None]
-    px = feet[..., :1] + c * FOOT_POINTS[:, 0] - s * FOOT_POINTS[:, 1]
-    py = feet[..., 1:2] + s * FOOT_POINTS[:, 0] + c * FOOT_POINTS[:, 1]
-    read = scan_ground(np, plane, FRAME, qpos, scan)
-    assert (read[:, :187] == scan_ground(np, plane, FRAME, qpos)).all()
-    assert np.abs(read[:, 187:].reshape(30, 4, 35) - (0.3 * px - 0.2 * py)).max() <= 0.025 * 0.5 + 1e-6
 
 
 def test_heights_must_fit_the_frame():

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from vinl.robot.observation import STANDARD_SCAN, HeightScan
+from vinl.robot.observation import SCAN_RADIUS
 from vinl.sensing.detour import DetourConfig, bend_command, keep_out
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.blocks import Blocks
@@ -16,7 +16,7 @@ from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
 
 
-def rasterise_plan(plan: FloorPlan, reach: float = STANDARD_SCAN.reach) -> HeightField:
+def rasterise_plan(plan: FloorPlan, reach: float = SCAN_RADIUS) -> HeightField:
     """Walls and furniture as heights on the plan's grid; what hangs above the robot leaves the floor free.
 
     Level ground lies around them, as wide as robots look from where they are [m]: none reads a neighbour's grid.
@@ -40,7 +40,6 @@ class GroundScan:
     Args:
         plan: walls and furniture.
         blocks: of each episode.
-        scan: where to read.
         detour: how commands are bent; None: not at all.
     """
 
@@ -48,23 +47,22 @@ class GroundScan:
         self,
         plan: FloorPlan,
         blocks: Sequence[Blocks],
-        scan: HeightScan = STANDARD_SCAN,
         detour: DetourConfig | None = None,
     ) -> None:
-        bare = rasterise_plan(plan, max(scan.reach, 0.0 if detour is None else detour.reach))
+        bare = rasterise_plan(plan, max(SCAN_RADIUS, 0.0 if detour is None else detour.reach))
         if not any(len(b) for b in blocks):
-            self._stack([bare], scan, detour)
+            self._stack([bare], detour)
             return
         fields = [HeightField(bare.heights.copy(), bare.labels.copy(), bare.frame) for _ in blocks]
         for field, some in zip(fields, blocks, strict=True):
             raise_boxes(field, some.boxes(), BLOCK)
-        self._stack(fields, scan, detour)
+        self._stack(fields, detour)
 
-    def _stack(self, fields: Sequence[HeightField], scan: HeightScan, detour: DetourConfig | None) -> None:
+    def _stack(self, fields: Sequence[HeightField], detour: DetourConfig | None) -> None:
         """One field for each robot, or one for all."""
         frame = fields[0].frame
         rows, columns = frame.shape
-        self._scan, self._heights = scan, np.concatenate([field.heights for field in fields]).ravel()
+        self._heights = np.concatenate([field.heights for field in fields]).ravel()
         self._frame = GridFrame(frame.x0, frame.y0, frame.resolution, (len(fields) * rows, columns))
         self._shift = np.arange(len(fields)) * rows * frame.resolution
         self._detour = None
@@ -74,7 +72,7 @@ class GroundScan:
 
     def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n points"]:
         """Height of the ground [m] under the scan points of every robot."""
-        return scan_ground(np, self._heights, self._frame, self._on_grid(qpos), self._scan)
+        return scan_ground(np, self._heights, self._frame, self._on_grid(qpos))
 
     def bend(self, qpos: Float[np.ndarray, "n 19"], command: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """The commands as the locomotor is given them: with detours, if it was trained with such."""

@@ -11,7 +11,6 @@ from jaxtyping import Bool, Float, Int
 from vinl.config.errors import InputError
 from vinl.evaluation.ground_scan import GroundScan
 from vinl.evaluation.scene import build_scene
-from vinl.robot.observation import STANDARD_SCAN, HeightScan
 from vinl.sensing.depth import Mesh
 from vinl.sensing.detour import DetourConfig
 from vinl.world.blocks import Blocks
@@ -120,10 +119,8 @@ class Ground:
 class FieldScan(GroundScan):
     """Reads the height scan of robots that all walk on one height field."""
 
-    def __init__(
-        self, field: HeightField, scan: HeightScan = STANDARD_SCAN, detour: DetourConfig | None = None
-    ) -> None:
-        self._stack([field], scan, detour)
+    def __init__(self, field: HeightField, detour: DetourConfig | None = None) -> None:
+        self._stack([field], detour)
 
 
 def build_ground(config: GroundConfig) -> Ground:

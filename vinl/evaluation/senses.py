@@ -12,10 +12,10 @@ from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.evaluation.eyes import Eyes, open_eyes
 from vinl.evaluation.ground_scan import GroundScan
-from vinl.policies.card import find_detour
+from vinl.policies.card import find_detour, reads_ground
 from vinl.policies.policy import Policy
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
-from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE, SCANS, find_scan, observe
+from vinl.robot.observation import OBSERVATION_SIZE, PROPRIOCEPTION_SIZE, SCAN_SIZE, observe
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
 
@@ -26,8 +26,8 @@ MOUNT_REACH = 0.25
 class Senses:
     """Asks a locomotor for the next action of all robots of a unit.
 
-    A policy of 48 numbers gets only proprioception, one of more that height scan of ``SCANS`` that makes up the rest;
-    one with a camera gets depth too.
+    A policy of 48 numbers gets only proprioception, one of 235 the height scan too; one with a camera gets
+    depth.
 
     Args:
         locomotor: the policy.
@@ -62,8 +62,7 @@ class Senses:
 
 def give_senses(locomotor: Policy, plan: FloorPlan, blocks: Sequence[Blocks], ceiling: float | None = None) -> Senses:
     """The senses of robots in a floor plan, each with its own clutter, see ``open_eyes``."""
-    points = find_scan(locomotor.card.observation_size)
-    scan = None if points is None else GroundScan(plan, blocks, points, find_detour(locomotor.card))
+    scan = GroundScan(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
     eyes = None if locomotor.camera is None else open_eyes(plan, blocks, locomotor.camera, ceiling)
     return Senses(locomotor, scan, eyes)
 
@@ -116,11 +115,10 @@ def check_senses(policy: Policy) -> None:
     card = policy.card
     if card.kind != "locomotion":
         raise InputError(f"{card.name} is a {card.kind} policy; a locomotor (--loco, --policy) is a locomotion policy")
-    if card.observation_size != PROPRIOCEPTION_SIZE and find_scan(card.observation_size) is None:
-        known = " or ".join(f"{scan.observation_size}" for scan in SCANS)
+    if card.observation_size not in (PROPRIOCEPTION_SIZE, OBSERVATION_SIZE):
         raise InputError(
             f"policy {card.name} observes {card.observation_size} numbers; the robot has {PROPRIOCEPTION_SIZE}, or "
-            f"{known} with the height scan"
+            f"{OBSERVATION_SIZE} with the height scan"
         )
     if find_detour(card) is not None and card.observation_size == PROPRIOCEPTION_SIZE:
         raise InputError(f"policy {card.name}: commands are bent only for one that observes the height scan")

@@ -15,9 +15,8 @@ from vinl.evaluation.robot_records import FRONT, REAR, RobotRecord
 from vinl.evaluation.senses import Senses
 from vinl.evaluation.touches import BlockTouches
 from vinl.evaluation.walker import joint_targets
-from vinl.policies.card import find_detour
+from vinl.policies.card import find_detour, reads_ground
 from vinl.policies.policy import Policy
-from vinl.robot.observation import find_scan
 from vinl.robot.rotation import rotate_inverse
 
 SETTLED = 50
@@ -78,8 +77,7 @@ def run_trial(
 
 def sense_ground(policy: Policy, ground: Ground, n: int) -> Senses:
     """What a policy of n robots observes on a ground that all of them walk on."""
-    points = find_scan(policy.card.observation_size)
-    scan = None if points is None else FieldScan(ground.field, points, find_detour(policy.card))
+    scan = FieldScan(ground.field, find_detour(policy.card)) if reads_ground(policy.card) else None
     eyes = None if policy.camera is None else Eyes([ground.mesh()], [0] * n, policy.camera)
     return Senses(policy, scan, eyes)
 

@@ -28,9 +28,6 @@ def draw_commands(config: CommandConfig, u: Float[Array, "n 5"]) -> tuple[Float[
         (n, 3) forward, left [m/s] and yaw rate [rad/s]; (n,) control steps until the next command.
     """
     forward = between(config.forward, u[:, 0])
-    if config.back_share > 0:  # the same draw decides what a command is: standing, turning, or leading back come first
-        upto = config.stand_share + config.turn_share + config.back_share
-        forward = jnp.where(u[:, 4] < upto, between(config.back, u[:, 0]), forward)
     plane = jnp.stack([forward, between(config.left, u[:, 1])], 1)
     plane = jnp.where(jnp.linalg.norm(plane, axis=1, keepdims=True) > config.min_speed, plane, 0.0)
     turn = between(config.yaw_rate, u[:, 2:3])

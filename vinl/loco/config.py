@@ -8,8 +8,6 @@ from typing import Literal
 from vinl.config.errors import InputError
 from vinl.loco.student_config import StudentConfig
 from vinl.robot.aliengo import KD, KP
-from vinl.robot.observation import SCANS, STANDARD_SCAN, HeightScan
-from vinl.sensing.detour import DetourConfig
 from vinl.world.terrain import TerrainConfig
 
 Range = tuple[float, float]
@@ -31,8 +29,6 @@ class CommandConfig:
         min_speed: slower linear commands become zero [m/s] [legged_gym: 0.2].
         stand_share: share of commands that are zero.
         turn_share: share of commands that only turn on the spot.
-        back: range of the forward velocity of commands that lead backwards [m/s].
-        back_share: share of these commands; all others are drawn from ``forward``.
     """
 
     forward: Range = (-1.0, 1.0)
@@ -42,17 +38,15 @@ class CommandConfig:
     min_speed: float = 0.2
     stand_share: float = 0.05
     turn_share: float = 0.1
-    back: Range = (-0.4, -0.2)
-    back_share: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("forward", "left", "yaw_rate", "hold", "back"):
+        for name in ("forward", "left", "yaw_rate", "hold"):
             _check_range(f"commands.{name}", getattr(self, name))
         if self.hold[0] <= 0:
             raise InputError(f"commands.hold must be positive, got {self.hold[0]}")
-        shares = self.stand_share, self.turn_share, self.back_share
+        shares = self.stand_share, self.turn_share
         if min(shares) < 0 or sum(shares) > 1:
-            raise InputError("commands: stand_share, turn_share and back_share must be shares that add up to at most 1")
+            raise InputError("commands: stand_share and turn_share must be shares that add up to at most 1")
 
 
 @dataclass(frozen=True)
@@ -62,8 +56,6 @@ class RewardConfig:
     Attributes:
         linear_velocity: exp(-error^2 / sigma) of the commanded velocity in the plane.
         yaw_rate: exp(-error^2 / sigma) of the commanded turning rate.
-        wide_linear_velocity, wide_yaw_rate: the same with a width of 0.3, whatever ``sigma`` is: they tell a large
-            error from a larger one.
         vertical_velocity: vertical speed squared.
         roll_pitch_rate: squared rates of roll and pitch.
         torque: squared joint torques.
@@ -73,24 +65,15 @@ class RewardConfig:
         air_time: seconds over 0.5 that a foot was in the air, at touch-down.
         obstacle_contact: feet that touch a block or wall.
         leg_contact: shanks that touch a block or wall (``collision`` counts them once more).
-        near_block: feet within 5 cm of a block, above or beside it: 0 there, 1 where they touch.
-        low_feet: speed of the feet over the ground where they are less than 5 cm above everything within 10 cm, times
-            what they lack [5 cm]: for each metre that a foot slides, 1 on level ground, 5 through a block 0.2 m high.
         orientation: squared tilt of the trunk.
         stand_still: joint angles away from the default pose while told to stand.
         fall: one fall (not multiplied by the control step).
-        velocity_error: squared error of the commanded velocity in the plane.
-        drift: error of the velocity in the plane, smoothed over half a second [m/s]; for each metre off the way, then,
-            however slowly it was left.
-        turn_drift: the same of the turning rate [rad/s].
         sigma: width of the tracking terms [(m/s)^2].
         floor: the sum of a step's terms is held to at least this for each second [legged_gym: 0].
     """
 
     linear_velocity: float = 1.0
     yaw_rate: float = 0.5
-    wide_linear_velocity: float = 0.0
-    wide_yaw_rate: float = 0.0
     vertical_velocity: float = -2.0
     roll_pitch_rate: float = -0.05
     torque: float = -1e-5
@@ -100,13 +83,8 @@ class RewardConfig:
     air_time: float = 1.0
     obstacle_contact: float = 0.0
     leg_contact: float = 0.0
-    near_block: float = 0.0
-    low_feet: float = 0.0
     orientation: float = 0.0
     stand_still: float = 0.0
-    velocity_error: float = 0.0
-    drift: float = 0.0
-    turn_drift: float = 0.0
     fall: float = 0.0
     sigma: float = 0.25
     floor: float = 0.0
@@ -289,14 +267,6 @@ class LocoConfig:
         seed: of everything random.
         episode_length: [s] [ViNL config: 20].
         kp, kd: joint gains [N m / rad, N m s / rad].
-        scan_spacing: of the points at which actor and critic read the ground, 0.1 (187 of them) or 0.05 (693: an edge
-            as exactly as the ground's cells of 5 cm have it) [m].
-        scan_ahead: how far before the middle of the trunk they reach, 0.8 (half a metre before the front feet) or 1.6
-            (275 points, or 1029: a block in time to pass it without haste) [m].
-        scan_feet: whether they also read it at 35 points about each foot, as the height of the foot above them.
-        detour: bend the commands that actor and critic are given, so that the feet pass beside what the terrain has on
-            their way; rewards hold the robot to the commands as they are. None: they are given as they are; in
-            stage 3, where the student has to find them out itself: as the teacher's are.
         ppo, anneal: not used by stage 3.
         student: stage 3 alone.
     """
@@ -309,10 +279,6 @@ class LocoConfig:
     episode_length: float = 20.0
     kp: float = KP
     kd: float = KD
-    scan_spacing: float = STANDARD_SCAN.spacing
-    scan_ahead: float = STANDARD_SCAN.ahead
-    scan_feet: bool = STANDARD_SCAN.feet
-    detour: DetourConfig | None = None
     terrain: TerrainConfig = field(default_factory=TerrainConfig)
     commands: CommandConfig = field(default_factory=CommandConfig)
     rewards: RewardConfig = field(default_factory=RewardConfig)
@@ -335,12 +301,3 @@ class LocoConfig:
             raise InputError(f"episode_length must be positive, got {self.episode_length}")
         if self.kp <= 0 or self.kd < 0:
             raise InputError("kp must be positive and kd not negative")
-        for name, value in (("spacing", self.scan_spacing), ("ahead", self.scan_ahead)):
-            known = list(dict.fromkeys(getattr(scan, name) for scan in SCANS))
-            if value not in known:
-                raise InputError(f"scan_{name} must be {' or '.join(f'{x:g}' for x in known)} m, got {value:g}")
-
-    @property
-    def scan(self) -> HeightScan:
-        """The height scan with that spacing and reach, and with or without points about the feet."""
-        return HeightScan(self.scan_spacing, self.scan_ahead, self.scan_feet)

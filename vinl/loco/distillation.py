@@ -85,8 +85,6 @@ class Distillation:
                     self._depth[k : k + 1], self._vectors[k : k + 1], self._state, self._fresh[k : k + 1]
                 )
             label = self.teacher.encoder(exact[:, PROPRIOCEPTION_SIZE:])
-            if self.student.detour:
-                label = torch.cat([label, self.student.read_detour(vector, exact)], 1)
             self._labels[k].copy_(label)
             if self.teacher_share > 0:
                 guided = self._order[:, None] < self.teacher_share

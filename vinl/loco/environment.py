@@ -19,9 +19,8 @@ from vinl.loco.rewards import Motion, reward_terms
 from vinl.loco.simulation import Body, Contacts, Ground, Simulation
 from vinl.loco.state import State, count_steps, first_state, start_body, strip_weak_types
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
-from vinl.robot.observation import CLIP, observe
+from vinl.robot.observation import CLIP, NOISE, observe
 from vinl.robot.rotation import rotate_inverse
-from vinl.sensing.detour import bend_command
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.terrain import build_terrain
 
@@ -31,9 +30,6 @@ _EDGE = 2.0
 MAX_SPEED = 150.0
 """A speed beyond this [m/s, rad/s] means that the physics blew up."""
 
-_SMOOTHING = 0.5
-"""Time constant of ``State.drift`` [s]: about a stride, so that the sway of the gait is no drift."""
-
 _UPSIDE = -0.3
 """Third component of the gravity vector in the trunk above which the robot has fallen: tilted by more than 72 deg."""
 
@@ -42,8 +38,7 @@ class StepResult(NamedTuple):
     """What a step gives to the learner.
 
     Attributes:
-        observation: (n, numbers) with noise, for the actor; exact: the same without, for the critic; 235 numbers, or
-            what else the scan of the training makes of it.
+        observation: (n, numbers) with noise, for the actor; exact: the same without, for the critic.
         reward: (n,); done: (n,) 1 where fallen or out of time; timeout: (n,) 1 where out of time.
         pose: (n, 7) position [m] and quaternion of the trunk, which belong to the observation.
     """
@@ -73,8 +68,7 @@ class LocoEnvironment:
         self.config = config
         self.num_envs = config.num_envs
         self.terrain = build_terrain(config.terrain)
-        margin = None if config.detour is None else config.detour.margin
-        self.simulation = Simulation(self.terrain.ground, config.kp, config.kd, self.terrain.blocks, margin)
+        self.simulation = Simulation(self.terrain.ground, config.kp, config.kd, self.terrain.blocks)
         self.episode_steps = count_steps(config)
         device = jax.devices()[0]
         self._starts = jax.device_put(jnp.asarray(self.terrain.starts, jnp.float32), device)
@@ -139,19 +133,12 @@ class LocoEnvironment:
     def _observations(
         self, ground: Ground, state: State
     ) -> tuple[Float[Array, "n numbers"], Float[Array, "n numbers"]]:
-        """With noise and without. The noise is the state's own, so that a state that is loaded observes the same.
-
-        With detours both have the bent commands, but for a student: it is given the command as it is, and has to find
-        the detour out."""
-        scan, detour, body = self.config.scan, self.config.detour, state.body
-        heights = scan_ground(jnp, ground.heights, self.simulation.frame, body.qpos, scan)
-        exact = seen = observe(jnp, body.qpos, body.qvel, state.command, state.action, heights)
-        if detour is not None:
-            command = bend_command(jnp, ground.closed, self.simulation.frame, body.qpos, state.command, detour)
-            exact = observe(jnp, body.qpos, body.qvel, command, state.action, heights)
-            seen = seen if self.config.stage == 3 else exact
+        """With noise and without. The noise is the state's own, so that a state that is loaded observes the same."""
+        body = state.body
+        heights = scan_ground(jnp, ground.heights, self.simulation.frame, body.qpos)
+        exact = observe(jnp, body.qpos, body.qvel, state.command, state.action, heights)
         noise = jax.random.uniform(jax.random.fold_in(state.key, 1), exact.shape)
-        return seen + self.config.randomisation.observation_noise * jnp.asarray(scan.noise) * (2 * noise - 1), exact
+        return exact + self.config.randomisation.observation_noise * jnp.asarray(NOISE) * (2 * noise - 1), exact
 
     def _advance(
         self, ground: Ground, old: State, lost: Lost, given: Float[Array, "n 12"], rewards: dict[str, Any]
@@ -237,7 +224,6 @@ class LocoEnvironment:
             life=jnp.where(done, 0, life),
             air_time=ended(jnp.zeros((n, 4)), motion.air_time * ~touching),
             touched=ended(jnp.zeros((n, 4), bool), contacts.foot),
-            drift=ended(jnp.zeros((n, 3)), motion.drift),
             way=jnp.where(done, 0.0, way),
             commanded=jnp.where(done, 0.0, commanded),
             hits=jnp.where(done, 0.0, hits),
@@ -264,7 +250,6 @@ class LocoEnvironment:
         gravity = rotate_inverse(jnp, quaternion, down)
         touching = contacts.foot | old.touched
         linear, angular = rotate_inverse(jnp, quaternion, body.qvel[:, :3]), body.qvel[:, 3:6]
-        error = jnp.concatenate([linear[:, :2], angular[:, 2:]], 1) - old.command
         motion = Motion(
             linear=linear,
             angular=angular,
@@ -279,7 +264,6 @@ class LocoEnvironment:
             contacts=contacts,
             air_time=old.air_time + CONTROL_DT,
             landed=(old.air_time > 0) & touching,
-            drift=old.drift + (error - old.drift) * (CONTROL_DT / _SMOOTHING),
             fallen=contacts.trunk_down | (gravity[:, 2] > _UPSIDE) | broken,
         )
         return motion, touching

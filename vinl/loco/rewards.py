@@ -10,15 +10,6 @@ from jaxtyping import Array, Bool, Float
 from vinl.loco.simulation import Contacts
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
 
-NEAR_BLOCK = 0.05
-"""A foot nearer to a block than this costs ``near_block`` [m]: half the pitch of the height scan, so that a foot which
-keeps it clears a block whose edges the scan does not show more exactly."""
-
-
-WIDE = 0.3
-"""Width of the wide tracking terms [(m/s)^2, (rad/s)^2]: they fall nearly as the square of an error up to 0.4,
-where the narrow ones of a late training (0.06) have come to nothing."""
-
 
 class Motion(NamedTuple):
     """What the terms are computed from; velocities in the trunk's frame.
@@ -34,7 +25,6 @@ class Motion(NamedTuple):
         contacts: latched over the control step.
         air_time: (n, 4) seconds since each foot left the ground, this step included.
         landed: (n, 4) feet that touch down in this step.
-        drift: (n, 3) the errors of forward and sideways speed [m/s] and yaw rate [rad/s], smoothed over half a second.
         fallen: (n,).
     """
 
@@ -51,7 +41,6 @@ class Motion(NamedTuple):
     contacts: Contacts
     air_time: Float[Array, "n 4"]
     landed: Bool[Array, "n 4"]
-    drift: Float[Array, "n 3"]
     fallen: Bool[Array, " n"]
 
 
@@ -72,8 +61,6 @@ def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"
     return {
         "linear_velocity": jnp.exp(-error2 / sigma),
         "yaw_rate": jnp.exp(-((m.command[:, 2] - m.angular[:, 2]) ** 2) / sigma),
-        "wide_linear_velocity": jnp.exp(-error2 / WIDE),
-        "wide_yaw_rate": jnp.exp(-((m.command[:, 2] - m.angular[:, 2]) ** 2) / WIDE),
         "vertical_velocity": m.linear[:, 2] ** 2,
         "roll_pitch_rate": jnp.sum(m.angular[:, :2] ** 2, 1),
         "torque": jnp.sum(m.torque**2, 1),
@@ -83,12 +70,7 @@ def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"
         "air_time": jnp.sum((m.air_time - 0.5) * m.landed, 1) * (speed > 0.1),
         "obstacle_contact": foot_hit.sum(1).astype(jnp.float32),
         "leg_contact": shank_hit.sum(1).astype(jnp.float32),
-        "near_block": jnp.sum(jnp.clip(1 - m.contacts.foot_gap / NEAR_BLOCK, 0.0, 1.0), 1),
-        "low_feet": jnp.sum(m.contacts.foot_low, 1) / CONTROL_DT,
         "orientation": jnp.sum(m.gravity[:, :2] ** 2, 1),
         "stand_still": jnp.sum(jnp.abs(m.joints - jnp.asarray(DEFAULT_POSE, jnp.float32)), 1) * told_to_stand,
-        "velocity_error": error2,
-        "drift": jnp.linalg.norm(m.drift[:, :2], axis=1),
-        "turn_drift": jnp.abs(m.drift[:, 2]),
         "fall": m.fallen / CONTROL_DT,
     }

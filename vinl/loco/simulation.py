@@ -15,7 +15,6 @@ from scipy import ndimage
 from vinl.robot.aliengo import FOOT_GEOMS, FOOT_RADIUS, SHANK_SPHERES, SUBSTEPS, TRUNK_SPHERES
 from vinl.robot.aliengo import LEGS as LEG_NAMES
 from vinl.robot.model import robot_spec
-from vinl.sensing.detour import keep_out
 from vinl.world.blocks import Blocks
 from vinl.world.clearance import FAR, block_distances, clearance
 from vinl.world.heightfield import BLOCK, WALL, HeightField
@@ -35,12 +34,6 @@ SHANK_REACH = 0.018
 """A shank nearer than this to a block [m] touches it: the capsule's 0.0145 m and the error of the grid. Chosen so that
 the count agrees with MuJoCo C's contacts of the capsule on the same motion."""
 
-LIFT = 0.05
-"""A foot should move so high above everything near it [m]: half the pitch of the height scan, as ``NEAR_BLOCK``."""
-
-_LIFT_CELLS = 2
-"""Near it is within this many cells, 10 cm: as far as a foot's way to a block's edge rises or falls over the block."""
-
 FOOT_REACH = FOOT_RADIUS + 0.02
 """A foot whose middle is farther than this from any block [m] does not touch one: what it touches then is the slope
 that the height field has for the block's side, up to a cell wide."""
@@ -55,8 +48,6 @@ class Ground(NamedTuple):
         near: (rows * columns,) bit 1: a block lies near; bit 2: a wall lies near.
         distance, top: (rows * columns,) distance from the nearest block and its height [m], for the shanks; one number
             where the ground has no blocks.
-        crest: (rows * columns,) height of the highest ground or block within 10 cm [m]; walls do not count.
-        closed: (rows * columns,) where feet should stay out; one cell where no detours are planned.
     """
 
     normalised: Float[Array, " cells"]
@@ -64,8 +55,6 @@ class Ground(NamedTuple):
     near: Array
     distance: Float[Array, " cells"]
     top: Float[Array, " cells"]
-    crest: Float[Array, " cells"]
-    closed: Bool[Array, " cells"]
 
 
 class Body(NamedTuple):
@@ -86,9 +75,6 @@ class Contacts(NamedTuple):
     Attributes:
         foot, shank: (n, 4) anything; trunk: (n,) anything; trunk_down: (n,) something from above.
         foot_block, shank_block, foot_wall, shank_wall: (n, 4) a block, a wall.
-        foot_gap: (n, 4) least distance of a foot's surface from the blocks at any substep, at most ``FAR`` [m].
-        foot_low: (n, 4) each foot's way over the ground [m], times how many ``LIFT`` its surface lacks on it to be one
-            ``LIFT`` above everything near.
     """
 
     foot: Bool[Array, "n 4"]
@@ -99,8 +85,6 @@ class Contacts(NamedTuple):
     shank_block: Bool[Array, "n 4"]
     foot_wall: Bool[Array, "n 4"]
     shank_wall: Bool[Array, "n 4"]
-    foot_gap: Float[Array, "n 4"]
-    foot_low: Float[Array, "n 4"]
 
 
 class Simulation:
@@ -111,7 +95,6 @@ class Simulation:
         kp, kd: joint gains [N m / rad, N m s / rad].
         blocks: those on the ground: the whole length of the shanks is held against them. The three spheres of a shank
             leave gaps through which the edge of a block slips.
-        margin: how far from blocks and walls feet should stay where detours are planned [m]; None: none are.
 
     Attributes:
         ground: the arrays that ``step`` needs.
@@ -119,9 +102,7 @@ class Simulation:
         model: the MuJoCo model.
     """
 
-    def __init__(
-        self, field: HeightField, kp: float, kd: float, blocks: Blocks | None = None, margin: float | None = None
-    ) -> None:
+    def __init__(self, field: HeightField, kp: float, kd: float, blocks: Blocks | None = None) -> None:
         self.frame = field.frame
         rows, columns = field.frame.shape
         low, span = float(field.heights.min()), max(float(np.ptp(field.heights)), 0.1)
@@ -153,15 +134,9 @@ class Simulation:
         if blocks is not None and len(blocks) > 0:
             distance, top = block_distances(field.frame, blocks.boxes())
         near = _near(field, BLOCK) + 2 * _near(field, WALL)
-        closed = np.zeros(1, bool) if margin is None else keep_out(field, margin)
         # committed arrays only: a mixture of committed and uncommitted ones compiles every program twice
         self.ground = jax.device_put(
-            Ground(
-                *(
-                    jnp.asarray(x.reshape(-1))
-                    for x in (normalised, field.heights, near, distance, top, _crest(field), closed)
-                )
-            ),
+            Ground(*(jnp.asarray(x.reshape(-1)) for x in (normalised, field.heights, near, distance, top))),
             jax.devices()[0],
         )
         self._contact_rows = self._find_contact_rows()
@@ -209,7 +184,7 @@ class Simulation:
         Returns:
             The new state, the latched contacts and the torques of the last substep [N m].
         """
-        qpos, qvel, warm, flags, gap, low, torque = self._substeps(ground, *body, target, friction, added_mass)
+        qpos, qvel, warm, flags, torque = self._substeps(ground, *body, target, friction, added_mass)
         n = len(qpos)
         touch, block, wall = (
             flags[:, : LEGS + TRUNK],
@@ -229,8 +204,6 @@ class Simulation:
             shank_block=by_leg(block) | flags[:, 3 * LEGS + TRUNK : -1],
             foot_wall=wall[:, :FEET],
             shank_wall=by_leg(wall),
-            foot_gap=gap,
-            foot_low=low,
         )
         return Body(qpos, qvel, warm), contacts, torque
 
@@ -252,7 +225,7 @@ class Simulation:
         model = self.robot_model(ground, friction, added_mass)
 
         def substep(carry, _):
-            qpos, qvel, warm, flags, gap, _ = carry
+            qpos, qvel, warm, flags, _ = carry
             data = self.physics_step(model, qpos, qvel, warm, target)
             contact = data._impl.contact
             on = contact.dist[self._contact_rows] < 0
@@ -266,23 +239,11 @@ class Simulation:
                 block = jnp.concatenate([block[:FEET] & (free < FOOT_REACH), block[FEET:]])
             down = jnp.any(on[LEGS:] & (up[LEGS:] > 0.5))
             new = jnp.concatenate([jnp.any(on, 1), block, wall, beside, down[None]])
-            gap = jnp.minimum(gap, free - FOOT_RADIUS)
-            feet = data.geom_xpos[self._feet]
-            return (data.qpos, data.qvel, data.qacc_warmstart, flags | new, gap, data.actuator_force), feet
+            return (data.qpos, data.qvel, data.qacc_warmstart, flags | new, data.actuator_force), None
 
         flags = jnp.zeros(3 * LEGS + TRUNK + FEET + 1, bool)
-        start = (qpos, qvel, warm, flags, jnp.full(FEET, FAR), jnp.zeros(12))
-        end, feet = jax.lax.scan(substep, start, None, length=SUBSTEPS)
-        return *end[:-1], self._low_way(ground, feet), end[-1]
-
-    def _low_way(self, ground: Ground, feet: Float[Array, "substeps 4 3"]) -> Float[Array, "4"]:
-        """``Contacts.foot_low`` of one robot from where its feet were when the substeps began."""
-        middle = (feet[1:] + feet[:-1]) / 2
-        way = jnp.linalg.norm(feet[1:, :, :2] - feet[:-1, :, :2], axis=-1)
-        lack = ground.crest[self.cell(middle[..., :2])] + LIFT - (middle[..., 2] - FOOT_RADIUS)
-        return jnp.sum(way * jnp.maximum(lack / LIFT, 0.0), 0) * (
-            SUBSTEPS / (SUBSTEPS - 1)
-        )  # the last one's end is not known
+        start = (qpos, qvel, warm, flags, jnp.zeros(12))
+        return jax.lax.scan(substep, start, None, length=SUBSTEPS)[0]
 
     def _at_blocks(self, ground: Ground, data: mjx.Data) -> tuple[Float[Array, "4"], Bool[Array, "4"]]:
         """By geometry: how far the middles of one robot's feet are from the blocks [m], and which of its shanks touch
@@ -298,10 +259,3 @@ class Simulation:
 def _near(field: HeightField, label: int) -> np.ndarray:
     """(rows, columns) uint8: 1 where a cell with the label lies near."""
     return ndimage.maximum_filter((field.labels == label).astype(np.uint8), 2 * _NEAR + 1)
-
-
-def _crest(field: HeightField) -> np.ndarray:
-    """(rows, columns) height of the highest ground or block near, for ``Ground.crest``."""
-    side = np.arange(-_LIFT_CELLS, _LIFT_CELLS + 1)
-    disc = np.hypot(*np.meshgrid(side, side)) <= _LIFT_CELLS
-    return ndimage.maximum_filter(np.where(field.labels == WALL, 0.0, field.heights).astype(np.float32), footprint=disc)

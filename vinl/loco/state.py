@@ -27,7 +27,6 @@ class State(NamedTuple):
         step: (n,) of the episode, from a random one at first; life: (n,) steps since the start, -1 where the
             observation is not finite.
         air_time: (n, 4) [s]; touched: (n, 4) feet on the ground in the last step.
-        drift: (n, 3) smoothed errors of forward and sideways speed [m/s] and yaw rate [rad/s].
         way, commanded: (n,) progress along the commands and what they asked for [m].
         hits: (n,) steps of the episode with a foot or shank on a block.
         level, column: (n,) tile.
@@ -45,7 +44,6 @@ class State(NamedTuple):
     life: Int[Array, " n"]
     air_time: Float[Array, "n 4"]
     touched: Bool[Array, "n 4"]
-    drift: Float[Array, "n 3"]
     way: Float[Array, " n"]
     commanded: Float[Array, " n"]
     hits: Float[Array, " n"]
@@ -117,7 +115,6 @@ def first_state(config: LocoConfig, starts: Float[Array, "levels columns 3"], ke
         life=jnp.zeros(n, jnp.int32),
         air_time=jnp.zeros((n, 4)),
         touched=jnp.zeros((n, 4), bool),
-        drift=jnp.zeros((n, 3)),
         way=jnp.zeros(n),
         commanded=jnp.zeros(n),
         hits=jnp.zeros(n),

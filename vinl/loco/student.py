@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 import torch
@@ -16,7 +16,7 @@ from vinl.loco.scenery import terrain_mesh
 from vinl.loco.sight import Sight
 from vinl.loco.sighted_env import SightedVecEnv
 from vinl.loco.student_config import StudentConfig
-from vinl.loco.warm_start import load_teacher, take_over_student
+from vinl.loco.warm_start import load_teacher
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.commit import find_commit
 from vinl.policies.depth_actor import DepthActor
@@ -44,8 +44,8 @@ def describe_student_figures(row: dict[str, float]) -> dict[str, str]:
     }
 
 
-def build_student(config: StudentConfig, teacher: MapActor, detour: bool = False) -> DepthActor:
-    """A fresh student in front of a teacher's actor; ``detour``: which is given bent commands."""
+def build_student(config: StudentConfig, teacher: MapActor) -> DepthActor:
+    """A fresh student in front of a teacher's actor."""
     net, camera, sizes = config.network, config.camera, teacher.arguments
     student = DepthActor(
         vision=net.vision,
@@ -60,7 +60,6 @@ def build_student(config: StudentConfig, teacher: MapActor, detour: bool = False
         code=sizes["code"],
         actor=sizes["actor"],
         actions=sizes["actions"],
-        detour=detour,
     )
     if net.remember:
         student.memory.spread_memory(net.remember)
@@ -91,8 +90,7 @@ def train_student(
     source = str(kept) if resume and kept.is_dir() else config.from_policy
     if source is None:
         raise InputError("stage 3 needs a teacher: give --from vinl/teacher, a policy folder or a run of stage 2")
-    teacher, origin, detour = load_teacher(source, config)
-    config = replace(config, detour=detour)
+    teacher, origin = load_teacher(source, config)
     if not resume:
         run.create(dump_config(config))
     if not kept.is_dir():
@@ -103,9 +101,7 @@ def train_student(
     torch.manual_seed(config.seed)
     torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
     stopwatch = Stopwatch(device)
-    student = build_student(settings, teacher, config.detour is not None)
-    if settings.start and not resume:
-        take_over_student(settings.start, student, config)
+    student = build_student(settings, teacher)
     environment = LocoEnvironment(config)
     camera = settings.camera.record()
     mesh = terrain_mesh(environment.terrain)
@@ -120,7 +116,7 @@ def train_student(
             name or run.path.name,
             policy.describe(),
             action,
-            scan=None,
+            scan=False,
             camera=camera.describe() if policy.image else None,
             training={**dump_config(config), "origin": described},
             seed=config.seed,
@@ -146,6 +142,4 @@ def train_student(
 
 def _teacher_card(name: str, config: LocoConfig, network: dict[str, Any], samples: int, commit: str) -> PolicyCard:
     action = {**describe_action(), "kp": config.kp, "kd": config.kd}
-    return locomotion_card(
-        name, network, action, scan=config.scan, detour=config.detour, samples=samples, commit=commit
-    )
+    return locomotion_card(name, network, action, samples=samples, commit=commit)

@@ -182,14 +182,8 @@ class DistillationConfig:
 
 @dataclass(frozen=True)
 class StudentConfig:
-    """Stage 3: the settings that the other stages do not have.
+    """Stage 3: the settings that the other stages do not have."""
 
-    Attributes:
-        start: take image network and memory over from this student (a shipped name, a folder or a run) when a run
-            begins; None: fresh ones.
-    """
-
-    start: str | None = None
     network: NetworkConfig = field(default_factory=NetworkConfig)
     camera: CameraConfig = field(default_factory=CameraConfig)
     sight: SightConfig = field(default_factory=SightConfig)

@@ -174,4 +174,4 @@ def make_card(
     action = {**describe_action(), "kp": config.kp, "kd": config.kd}
     training = {**dump_config(config), **({"origin": origin} if origin else {})}
     learned = {"seed": config.seed, "samples": samples, "commit": commit}
-    return locomotion_card(name, network, action, scan=config.scan, detour=config.detour, training=training, **learned)
+    return locomotion_card(name, network, action, training=training, **learned)

@@ -19,8 +19,7 @@ memory that the other still reads."""
 
 
 class LocoVecEnv(VecEnv):
-    """Observation groups: ``policy`` (with noise) and ``critic`` (exact), both (n, 235), or more
-    with another scan.
+    """Observation groups: ``policy`` (with noise) and ``critic`` (exact), both (n, 235).
 
     Args:
         environment: the robots.

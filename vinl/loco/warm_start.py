@@ -5,20 +5,15 @@ from __future__ import annotations
 import hashlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
-import torch
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
 from vinl.loco.config import LocoConfig
 from vinl.policies.card import PolicyCard, find_detour
-from vinl.policies.depth_actor import DepthActor
 from vinl.policies.io import find_policy, load_policy
 from vinl.policies.networks import BlindActor, MapActor
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
-from vinl.robot.observation import PROPRIOCEPTION_SIZE, HeightScan, find_scan
-from vinl.sensing.detour import DetourConfig
 
 
 @dataclass(frozen=True)
@@ -62,9 +57,6 @@ class WarmStart:
 def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
     """The networks of a policy (actor alone) or of a training run (actor and critic).
 
-    One that reads fewer points of the ground than the training gives is widened: it acts as before until it learns
-    what the new points are good for.
-
     Args:
         name_or_path: ``"rough"``, ``"vinl/rough"``, a policy folder or the folder of a training run.
         config: of the training that shall start from them.
@@ -74,34 +66,30 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
     """
     policy = load_policy(name_or_path)
     network, p = policy.network, config.ppo
-    sizes: dict[str, Any] = {"scan": config.scan.size, "actor": p.actor}
-    fresh = MapActor(encoder=p.encoder, code=p.code, **sizes) if p.map else BlindActor(**sizes)
+    fresh = MapActor(encoder=p.encoder, code=p.code, actor=p.actor) if p.map else BlindActor(actor=p.actor)
     given, wanted = network.describe(), fresh.describe()
-    read = find_scan(network.observation_size)
-    if given != wanted and (read is None or not config.scan.covers(read) or given != {**wanted, "scan": read.size}):
+    if given != wanted:
         raise InputError(
             f"--from {name_or_path}: its network {_list(given)} is not that of this training "
-            f"{_list(wanted)}; set scan_spacing, scan_ahead, scan_feet, ppo.map, ppo.encoder, ppo.code and ppo.actor "
-            "to its own, or give another policy"
+            f"{_list(wanted)}; set ppo.map, ppo.encoder, ppo.code and ppo.actor to its own, or give another policy"
         )
+    _refuse_detour(name_or_path, policy.card)
     check_gains(name_or_path, policy.card, config)
     actor = {name: weight.clone() for name, weight in network.state_dict().items()}
-    if p.map:
-        actor["encoder.0.weight"] = widen_scan(actor["encoder.0.weight"], 0, config.scan)
     critic = _load_critic(name_or_path, config)
     return WarmStart(actor, critic, find_origin(policy.card, network, critic is not None))
 
 
-def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origin, DetourConfig | None]:
-    """The teacher of a student, where it comes from, and how its commands are bent.
+def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origin]:
+    """The teacher of a student, and where it comes from.
 
     Args:
         name_or_path: as for ``load_warm_start``.
-        config: of the student's training; with no detour of its own it takes the teacher's.
+        config: of the student's training.
 
     Raises:
-        InputError: no such policy, one that does not read the height scan of this training, one with other detours
-            than this training asks for, or one with other joint gains.
+        InputError: no such policy, one that does not read the height scan, one whose commands are bent, or one with
+            other joint gains.
     """
     policy = load_policy(name_or_path)
     if not isinstance(policy.network, MapActor):
@@ -110,50 +98,9 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origi
             f"--from {name_or_path}: a student learns from a locomotor with a height scan (MapActor, such as "
             f"vinl/teacher); this is {kind}"
         )
-    given = find_scan(policy.card.observation_size)
-    if given is None or given != config.scan:
-        own = "" if given is None else f"; set {given.settings}"
-        raise InputError(
-            f"--from {name_or_path}: it observes {policy.card.observation_size} numbers, this training gives "
-            f"{config.scan.observation_size}{own}"
-        )
-    bent = find_detour(policy.card)
-    if config.detour not in (None, bent):
-        own = "none" if bent is None else " ".join(f"detour.{name}={value:g}" for name, value in asdict(bent).items())
-        raise InputError(
-            f"--from {name_or_path}: commands are bent otherwise here than it knows; take detour out of the config, a "
-            f"student has its teacher's ({own})"
-        )
+    _refuse_detour(name_or_path, policy.card)
     check_gains(name_or_path, policy.card, config)
-    return policy.network, find_origin(policy.card, policy.network, critic=False), bent
-
-
-def take_over_student(name_or_path: str, student: DepthActor, config: LocoConfig) -> None:
-    """Give a student the image network and memory of another one; the teacher's actor comes behind them later.
-
-    Args:
-        name_or_path: as for ``load_warm_start``.
-        student: its weights are overwritten.
-        config: of its training.
-
-    Raises:
-        InputError: no such policy, one with other networks or with other joint gains.
-    """
-    policy = load_policy(name_or_path)
-    given, wanted = policy.network.describe(), student.describe()
-    if given not in (wanted, {name: value for name, value in wanted.items() if name != "detour"}):
-        raise InputError(
-            f"student.start={name_or_path}: its network {_list(given)} is not that of this training {_list(wanted)}; "
-            "set student.network and student.camera to its own"
-        )
-    check_gains(name_or_path, policy.card, config)
-    weights = policy.network.state_dict()
-    if given != wanted:  # it knows of no detours yet
-        lacking = student.code - len(weights["head.weight"])
-        for name in ("head.weight", "head.bias"):
-            rows = weights[name]
-            weights[name] = torch.cat([rows, rows.new_zeros(lacking, *rows.shape[1:])])
-    student.load_state_dict(weights)
+    return policy.network, find_origin(policy.card, policy.network, critic=False)
 
 
 _KINDS = {
@@ -163,26 +110,12 @@ _KINDS = {
 }
 
 
-def widen_scan(weight: Tensor, ahead: int, scan: HeightScan) -> Tensor:
-    """The first layer of a network for a finer or farther height scan than it was trained with.
-
-    The weights of each old point go to the same point. All others are zero, so that the network answers as before.
-
-    Args:
-        weight: (width, ahead + k), for a scan of k points.
-        ahead: inputs before the scan.
-        scan: of the new network.
-
-    Returns:
-        (width, ahead + scan.size); the weight itself if it is of this scan.
-    """
-    old = find_scan(PROPRIOCEPTION_SIZE + weight.shape[1] - ahead)
-    if old is None or old == scan:
-        return weight
-    places = ahead + torch.from_numpy(scan.places_of(old))
-    wide = weight.new_zeros(len(weight), ahead + scan.size)
-    wide[:, :ahead], wide[:, places] = weight[:, :ahead], weight[:, ahead:]
-    return wide
+def _refuse_detour(name_or_path: str, card: PolicyCard) -> None:
+    if find_detour(card) is not None:
+        raise InputError(
+            f"--from {name_or_path}: it was trained with commands that a planner bends, and no training has these any "
+            "more; give a policy without detours, or train one: vinl train-loco --stage 2"
+        )
 
 
 def check_gains(name_or_path: str, card: PolicyCard, config: LocoConfig) -> None:
@@ -217,7 +150,7 @@ def _load_critic(name_or_path: str, config: LocoConfig) -> dict[str, Tensor] | N
     widths = tuple(w.shape[0] for name, w in critic.items() if name.startswith("mlp.") and w.ndim == 2)
     if widths != (*config.ppo.critic, 1):
         return None
-    return critic | {"mlp.0.weight": widen_scan(critic["mlp.0.weight"], PROPRIOCEPTION_SIZE, config.scan)}
+    return critic
 
 
 def _list(description: dict[str, object]) -> str:

@@ -14,7 +14,7 @@ from vinl.evaluation.navigator import Task
 from vinl.policies.card import PolicyCard, locomotion_card
 from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP
 from vinl.robot.cameras import Camera
-from vinl.robot.observation import OBSERVATION_SIZE, PROPRIOCEPTION_SIZE, STANDARD_SCAN
+from vinl.robot.observation import OBSERVATION_SIZE, PROPRIOCEPTION_SIZE
 
 
 class OwnNavigator:
@@ -105,6 +105,4 @@ def as_locomotor(
     network = {"class": "function", "observation_size": size}
     action = {"scale": scale, "default_pose": [float(q) for q in default_pose], "kp": kp, "kd": kd}
     seen = None if camera is None else camera.describe()
-    return OwnLocomotor(
-        act, camera, locomotion_card(called, network, action, STANDARD_SCAN if scan else None, camera=seen)
-    )
+    return OwnLocomotor(act, camera, locomotion_card(called, network, action, scan, camera=seen))

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP
-from vinl.robot.observation import STANDARD_SCAN, HeightScan, describe
+from vinl.robot.observation import HEIGHT_SCAN, PROPRIOCEPTION, TABLE
 from vinl.sensing.detour import DetourConfig
 
 SCHEMA = 1
@@ -95,8 +94,7 @@ def locomotion_card(
     name: str,
     network: dict[str, Any],
     action: dict[str, Any] | None = None,
-    scan: HeightScan | None = STANDARD_SCAN,
-    detour: DetourConfig | None = None,
+    scan: bool = True,
     **rest: Any,
 ) -> PolicyCard:
     """A locomotion card with this robot's observation table and, unless given, action; ``rest`` are further fields.
@@ -105,49 +103,27 @@ def locomotion_card(
         name: short name.
         network: as ``PolicyNetwork.describe`` gives it.
         action: scale, default pose and gains.
-        scan: the height scan that it observes, one of ``robot.observation.SCANS``; None, as for a policy that sees
-            through a camera: none.
-        detour: how its commands are bent before it observes them.
+        scan: whether it observes the height scan; a policy that sees through a camera does not.
     """
-    table = describe()[:-1] if scan is None else describe(scan)
-    if detour is not None:
-        table = _bend(table, detour)
+    table = (TABLE if scan else PROPRIOCEPTION).describe()
     return PolicyCard("locomotion", name, network, table, action or describe_action(), **rest)
+
+
+def reads_ground(card: PolicyCard) -> bool:
+    """Whether a policy observes the height scan."""
+    return any(row["name"] == HEIGHT_SCAN.name for row in card.observation)
 
 
 def find_detour(card: PolicyCard) -> DetourConfig | None:
     """How a locomotor's commands are bent before it observes them; None: they are given as they are.
+
+    No training bends commands any more: this goes with the weights of ``teacher`` that have such a card.
 
     Raises:
         InputError: the card asks for a detour that there cannot be.
     """
     given = next((row.get("detour") for row in card.observation if row["name"] == "command"), None)
     return None if given is None else build_config(DetourConfig, given, source=f"{card.name}: detour")
-
-
-def change_detour(card: PolicyCard, overrides: Sequence[str] = ()) -> PolicyCard:
-    """The card of a locomotor whose commands are bent as before, or as by default if they were not, but for overrides.
-
-    Args:
-        card: of a locomotor with a height scan: the planner has to know the ground.
-        overrides: such as ``turning=1.7``, fields of ``DetourConfig``.
-
-    Returns:
-        The card, without measurements.
-
-    Raises:
-        InputError: the card is another kind of policy's, or there cannot be such a detour.
-    """
-    if not any(row["name"] == "height_scan" for row in card.observation):
-        raise InputError(f"{card.name} has no height scan: only policies that know the ground have detours")
-    own = asdict(find_detour(card) or DetourConfig())
-    detour = build_config(DetourConfig, own, overrides, source=f"{card.name}: detour")
-    return replace(card, observation=_bend(card.observation, detour), evaluation={})
-
-
-def _bend(table: Sequence[dict[str, Any]], detour: DetourConfig) -> list[dict[str, Any]]:
-    """The observation table with a detour in its row ``command``."""
-    return [row | {"detour": asdict(detour)} if row["name"] == "command" else row for row in table]
 
 
 PREVIOUS = ("action", "motion", "both")

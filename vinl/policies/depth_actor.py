@@ -13,7 +13,8 @@ from vinl.policies.networks import PolicyNetwork, mlp
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCALE
 
 DETOUR = 0.1
-"""Unit of a detour in the code [m/s, rad/s]: about as much as one often is, so that it weighs as much as the rest."""
+"""Unit of a detour in the code [m/s, rad/s]. No training has detours any more: what is here of them goes with the
+weights of ``loco`` that have such a card."""
 
 _COMMAND = slice(10, 12)
 """Sideways speed and yaw rate of the command in the observation table."""
@@ -102,10 +103,6 @@ class DepthActor(PolicyNetwork):
             before, command, behind = vector.tensor_split((_COMMAND.start, _COMMAND.stop), -1)
             vector = torch.cat([before, command + bend, behind], -1)
         return self.actor(torch.cat([vector, code], -1))
-
-    def read_detour(self, vector: Float[Tensor, "n k"], bent: Float[Tensor, "n m"]) -> Float[Tensor, "n 2"]:
-        """The end of the code that leads from one observation's command to that of another."""
-        return (bent[:, _COMMAND] - vector[:, _COMMAND]) / self.bend
 
     def forward(
         self,

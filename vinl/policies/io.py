@@ -19,7 +19,7 @@ from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.device import choose_device
 from vinl.policies.networks import PolicyNetwork, build_network
 from vinl.policies.policy import LocomotionPolicy
-from vinl.robot.observation import PROPRIOCEPTION_SIZE, STANDARD_SCAN, describe, find_scan
+from vinl.robot.observation import PROPRIOCEPTION, PROPRIOCEPTION_SIZE, TABLE
 
 WEIGHTS_FILE = "policy.safetensors"
 
@@ -133,9 +133,9 @@ def _check_against_robot(card: PolicyCard, folder: Path, network: PolicyNetwork,
     if card.kind == "navigation":
         wanted, actions = navigation_table(find_previous(card)), 2
     else:
-        wanted, actions = describe(find_scan(network.observation_size) or STANDARD_SCAN), 12
-        if network.observation_size == PROPRIOCEPTION_SIZE:  # what sees needs no height scan
-            wanted = wanted[:-1]
+        # what sees needs no height scan
+        table = PROPRIOCEPTION if network.observation_size == PROPRIOCEPTION_SIZE else TABLE
+        wanted, actions = table.describe(), 12
     if network.action_size != actions or (card.kind == "navigation" and not sees):
         name, given = card.network["class"], network.action_size
         raise InputError(

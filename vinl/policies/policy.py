@@ -39,7 +39,7 @@ class Policy(Protocol):
 
 
 class LocomotionPolicy:
-    """Observations (n, 235), or more with another scan of ``SCANS``, to actions (n, 12) at 50 Hz, without noise, on
+    """Observations (n, 235) to actions (n, 12) at 50 Hz, without noise, on
     the device of its network."""
 
     camera: Camera | None = None

@@ -1,4 +1,7 @@
-"""Detours: how a command has to be bent, gently and in time, so that the feet pass beside what is on its way."""
+"""Detours: how a command has to be bent, gently and in time, so that the feet pass beside what is on its way.
+
+No training bends commands any more. This goes with the weights of ``teacher`` and ``loco`` whose cards have detours.
+"""
 
 from __future__ import annotations
 

@@ -15,8 +15,7 @@ from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
 from vinl.world.hurdles import draw_hurdles
-from vinl.world.joined import draw_rows, join_blocks, joined_share
-from vinl.world.rooms_tile import block_doors, draw_rooms
+from vinl.world.rooms_tile import draw_rooms
 
 RESOLUTION = 0.05
 """Pitch of the height field [m]."""
@@ -46,12 +45,7 @@ class TerrainConfig:
         block_height: range of the blocks' heights [m] [paper IV-A: 0.1-0.2].
         tall_density: furniture-like tall boxes per m2 on ``blocks`` and ``walls`` tiles beyond the first level.
         start_clear: half-width of the square around the start without blocks [m].
-        joined: share of the blocks that touch or overlap another: end to end, at an angle or side by side.
         wall_blocks: blocks on ``walls`` and ``rooms`` tiles, as a share of those on ``blocks`` tiles.
-        alleys: share of the spaces between the walls of ``rooms`` tiles that are alleys of 0.5-0.8 m.
-        door_blocks: share of the doorways of ``rooms`` tiles beyond the first level with a block across.
-        row_density: rows of blocks per m2 on ``blocks`` tiles beyond the first level, the same on all of these.
-        row_length: range of their lengths [m].
         first_height: range of the blocks' heights on the first level [m], from which they grow evenly to
             ``block_height`` on the last; None: ``block_height`` on all levels.
     """
@@ -72,12 +66,7 @@ class TerrainConfig:
     block_height: tuple[float, float] = (0.1, 0.2)
     tall_density: float = 0.03
     start_clear: float = 0.8
-    joined: float = 0.0
     wall_blocks: float = 0.0
-    alleys: float = 0.0
-    door_blocks: float = 0.0
-    row_density: float = 0.0
-    row_length: tuple[float, float] = (0.8, 2.0)
     first_height: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
@@ -90,12 +79,10 @@ class TerrainConfig:
             raise InputError(f"terrain: block_height must be a rising positive range, got {self.block_height}")
         if self.first_height is not None and not 0 < self.first_height[0] <= self.first_height[1]:
             raise InputError(f"terrain: first_height must be a rising positive range, got {self.first_height}")
-        if not 0 < self.row_length[0] <= self.row_length[1]:
-            raise InputError(f"terrain: row_length must be a rising positive range, got {self.row_length}")
-        if min(self.block_density, self.tall_density, self.row_density) < 0:
+        if min(self.block_density, self.tall_density) < 0:
             raise InputError("terrain: densities must not be negative")
-        if not all(0 <= share <= 1 for share in (self.joined, self.wall_blocks, self.alleys, self.door_blocks)):
-            raise InputError("terrain: joined, wall_blocks, alleys and door_blocks must lie in [0, 1]")
+        if not 0 <= self.wall_blocks <= 1:
+            raise InputError("terrain: wall_blocks must lie in [0, 1]")
         if self.start_clear < 0:
             raise InputError("terrain: start_clear must not be negative")
 
@@ -244,13 +231,9 @@ def build_terrain(config: TerrainConfig) -> Terrain:
                     rings = draw_hurdles(rng, TILE, config.start_clear, config.heights_at(k)).rows
                     blocks.append(Blocks(rings + shift[:6]))
             elif kind == "rooms":
-                rooms = draw_rooms(rng, TILE, difficulty, config.alleys)
-                tall.append(Boxes(rooms.walls.rows + shift))
+                tall.append(Boxes(draw_rooms(rng, TILE, difficulty).rows + shift))
                 if config.wall_blocks > 0:
                     blocks.append(_tile_blocks(config, rng, k, middle, none, config.wall_blocks))
-                if config.door_blocks > 0 and k > 0:
-                    across = block_doors(rng, rooms.doors, config.door_blocks, config.heights_at(k))
-                    blocks.append(Blocks(_clear_start(across, config.start_clear).rows + shift[:6]))
             elif kind == "walls":
                 count = round(difficulty * 0.15 * TILE**2)
                 here = scatter_centres(rng, count, TILE / 2 - 0.3, 1.0, 1.2, none)
@@ -285,25 +268,10 @@ def _tile_blocks(
 ) -> Blocks:
     """The blocks of a tile: none on the first level, ``share`` of the full density on the last, none at the start."""
     wanted = share * config.block_density * TILE**2 * level / max(config.levels - 1, 1)
-    partner = joined_share(config.joined)
     clear = config.start_clear + 0.3  # half a block's diagonal more
-    centres = scatter_centres(rng, round(wanted / (1 + partner)), TILE / 2, clear, 0.45, taken)
-    heights = config.heights_at(level)
-    blocks = draw_blocks(rng, centres, heights)
-    if partner > 0:
-        joined = join_blocks(rng, blocks, partner).rows
-        blocks += Blocks(joined[np.abs(joined[:, :2]).max(1, initial=0) >= clear])
-    if config.row_density > 0 and level > 0 and share == 1:
-        count = round(config.row_density * TILE**2)
-        here = scatter_centres(rng, count, TILE / 2 - 0.3, config.start_clear, 1.0, np.zeros((0, 2)))
-        rows = draw_rows(rng, here, config.row_length, heights)
-        blocks += _clear_start(rows, config.start_clear)
+    centres = scatter_centres(rng, round(wanted), TILE / 2, clear, 0.45, taken)
+    blocks = draw_blocks(rng, centres, config.heights_at(level))
     return Blocks(blocks.rows + np.array([*middle, 0, 0, 0, 0]))
-
-
-def _clear_start(blocks: Blocks, clear: float) -> Blocks:
-    """The blocks of a tile that leave a disc around its middle free [m]."""
-    return Blocks(blocks.rows[blocks.boxes().distances(_START)[:, 0] > clear])
 
 
 def _off_the_start(boxes: Boxes) -> Boxes:
