@@ -11,6 +11,7 @@ from vinl.nav.config import EpisodeConfig, RewardConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.robot_config import CameraConfig, ExecutionConfig, MotionConfig, ViewConfig
 from vinl.sensing.depth import DepthCamera
+from vinl.sensing.sensor_config import SensorConfig
 from vinl.world.mesh import floorplan_mesh
 from vinl.world.readers import load_floorplan
 
@@ -90,14 +91,55 @@ def test_sway_keeps_on_and_differs_between_episodes(config, homes):
     assert state["sway"].std(0).numpy() == pytest.approx(1.0, abs=0.06)
 
 
-def test_noise_and_holes(config, homes):
-    clean, _ = NavEnvironment(config, homes).observe()
-    noisy, _ = NavEnvironment(replace(config, view=ViewConfig(noise=0.02)), homes).observe()
-    middle = (clean > 0.05) & (clean < 0.9)
-    assert (noisy[middle].float() / clean[middle].float()).std().item() == pytest.approx(0.02, rel=0.2)
-    holes, _ = NavEnvironment(replace(config, view=ViewConfig(dropout=0.4)), homes).observe()
-    share = ((holes == 1) & (clean < 0.9)).float().mean()
-    assert 0.1 < share < 0.3
+def test_the_cameras_errors_reach_the_images(config, homes):
+    def look(missing="fill", **errors):
+        lens = replace(config.camera, missing=missing)
+        settings = replace(config, num_envs=200, camera=lens, sensors=SensorConfig(**errors))
+        environment = NavEnvironment(settings, homes)
+        return environment.observe()[0].float(), environment
+
+    clean, _ = look()
+    noisy, _ = look(noise=0.01)
+    middle = (clean > 0.05) & (clean < 0.6)
+    error = (noisy[middle] / clean[middle] - 1.0) / clean[middle]
+    assert error.std().item() == pytest.approx(0.1, rel=0.1)  # 0.01 / m x 10 m
+    marked, environment = look("plane", pixels=0.2)
+    assert (marked < 0).float().mean().item() == pytest.approx(0.2, abs=0.01)
+    torch.testing.assert_close(marked[marked >= 0], clean[marked >= 0])
+    again = environment.step(torch.zeros(200, 2)).depth.float()
+    assert not torch.equal(marked < 0, again < 0)
+    filled, _ = look("fill", pixels=0.2)
+    assert filled.min() > 0.0 and (filled == clean).float().mean() > 0.8
+    unprepared, _ = look("as_is", pixels=0.2)
+    assert torch.equal(unprepared == 1.0, (marked < 0) | (clean == 1.0))
+
+
+def test_an_image_is_as_old_and_the_camera_as_askew_as_drawn(config, homes):
+    settings = replace(config, num_envs=64, motion=MotionConfig())
+    now = NavEnvironment(settings, homes)
+    old = NavEnvironment(replace(settings, sensors=SensorConfig(delay=(0.25, 0.25), pitch=0.02, height=0.01)), homes)
+    start = now.state["position"].clone()
+    actions = torch.tensor([[0.6, 0.4]]).expand(64, 2)
+    done = now.advance(actions)[1] | old.advance(actions)[1]
+    eyes = []
+    for environment in (now, old):
+        environment.observe()
+        eyes.append([part.clone() for part in environment._eye])
+    kept = ~done & (now._blocked == 0)
+    assert kept.sum() > 20
+    heading = torch.atan2(eyes[0][1][:, 1, 0], eyes[0][1][:, 0, 0]) - torch.atan2(
+        eyes[1][1][:, 1, 0], eyes[1][1][:, 0, 0]
+    )
+    turn = torch.atan2(heading.sin(), heading.cos())[kept]
+    assert turn.numpy() == pytest.approx(0.25 * 0.4 * math.pi / 3, abs=1e-4)  # half of the way back
+    place = [eye[0][:, :2] - config.camera.forward * eye[1][:, :2, 0] for eye in eyes]
+    back = (place[0] - place[1])[kept].norm(dim=1)
+    assert back.numpy() == pytest.approx((place[0] - start)[kept].norm(dim=1).numpy() / 2, rel=0.02)
+    pitch = eyes[1][1][:, 2, 0].asin()
+    assert 0.01 < pitch.abs().max() <= 0.0201 and (eyes[1][0][:, 2] - 0.36).abs().max() <= 0.0101
+    resting = NavEnvironment(settings, homes)
+    for name in ("home", "goal", "position", "yaw", "gain", "mount", "sway"):
+        assert torch.equal(resting.state[name], NavEnvironment(old.config, homes).state[name])
 
 
 def test_reward_is_progress_and_the_goal_ends_the_episode(config, homes):

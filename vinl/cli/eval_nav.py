@@ -34,6 +34,9 @@ class Options:
     step that touches something is cancelled as a whole, as in the paper; walking robots can still turn), level
     (recorded on level ground), steady (not at all), or paper (roll and pitch redrawn within 30 deg at each step,
     perfect execution)."""
+    sensors: str = "ideal"
+    """Errors of the depth camera: ideal (none), realistic (a stereo camera: noise, holes, delay, a mount that is a
+    little off), or a YAML file like configs/sensors/realistic.yaml."""
     clutter: float = 0.0
     """Share of the homes with blocks that the camera sees and the robot steps over."""
     min_distance: float = 5.0
@@ -83,7 +86,13 @@ def main(argv: list[str]) -> int:
         raise InputError("--min-distance must lie between 0.5 m and --max-distance")
     distance = (options.min_distance, options.max_distance)
     rules = NavEvaluation(
-        options.episodes, options.seed, options.motion, distance, options.steps, clutter=options.clutter
+        options.episodes,
+        options.seed,
+        options.motion,
+        options.sensors,
+        distance,
+        options.steps,
+        clutter=options.clutter,
     )
     policy = load_navigator(options.policy, options.device)
     config = describe_episodes(None if policy is None else policy.card, rules)

@@ -20,12 +20,14 @@ T = TypeVar("T")
 def load_config(cls: type[T], name_or_path: str | Path, overrides: Sequence[str] = ()) -> T:
     """A configuration from a YAML file and overrides.
 
-    A file may begin with ``extends: other`` (a file beside it, or a bare name); it then holds only what differs.
+    A file may begin with ``extends: other`` (a file beside it, or a bare name); it then holds only what differs. A
+    group of values in it may too, ``sensors: {extends: sensors/realistic, noise: 0.0}``.
 
     Args:
         cls: frozen dataclass to build; nested dataclasses are built from nested mappings.
         name_or_path: bare name of a shipped config (``"loco/rough"``) or path of a ``.yaml`` file.
-        overrides: ``"ppo.epochs=3"``, applied in order after the file; values are read by the field's type.
+        overrides: ``"ppo.epochs=3"``, applied in order after the file; values are read by the field's type. A whole
+            group can be taken from a config: ``"sensors=sensors/ideal"``.
 
     Raises:
         InputError: missing or broken file, unknown key, wrong type, or a value that the dataclass refuses.
@@ -104,12 +106,20 @@ def _read(path: Path, inherited_by: tuple[Path, ...]) -> dict[str, Any]:
         chain = " -> ".join(p.name for p in (*inherited_by, resolved))
         raise InputError(f"{path}: extends itself ({chain}); remove one of the links")
     data = read_yaml(path)
-    parent = data.pop("extends", None)
+    return _extend(data, path, (*inherited_by, resolved))
+
+
+def _extend(data: Mapping[str, Any], path: Path, inherited_by: tuple[Path, ...]) -> dict[str, Any]:
+    """A mapping of a file, merged with what it extends; so are the mappings in it."""
+    inner = {
+        key: _extend(value, path, inherited_by) if isinstance(value, Mapping) else value for key, value in data.items()
+    }
+    parent = inner.pop("extends", None)
     if parent is None:
-        return data
+        return inner
     if not isinstance(parent, str):
         raise InputError(f"{path}: extends must be the name of a config, got {parent!r}")
-    return _merge(_read(find_config(parent, beside=path.parent), (*inherited_by, resolved)), data)
+    return _merge(_read(find_config(parent, beside=path.parent), inherited_by), inner)
 
 
 def _merge(base: Mapping[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
@@ -133,13 +143,22 @@ def _apply(cls: Any, data: dict[str, Any], override: str) -> None:
     for depth, key in enumerate(keys):
         kind = field_type(kind, key, ".".join(keys[:depth]), f"override {override!r}")
         if depth == len(keys) - 1:
-            if inner_dataclass(kind) is not None and not text.lstrip().startswith("{"):
-                raise InputError(f"override {override!r}: {dotted} is a group of values; set one of them")
+            if inner_dataclass(kind) is not None and not text.lstrip().startswith("{") and text != "null":
+                if not _names_config(text):
+                    raise InputError(
+                        f"override {override!r}: {dotted} is a group of values; set one of them, or name a config"
+                    )
+                data[key] = read_config(text)
+                continue
             data[key] = parse_override_value(text, kind, override)
         else:
             below = data.get(key)
             data[key] = dict(below) if isinstance(below, Mapping) else {}
             data = data[key]
+
+
+def _names_config(text: str) -> bool:
+    return text.endswith((".yaml", ".yml")) or text in list_configs()
 
 
 def _plain(value: Any) -> Any:

@@ -19,6 +19,7 @@ from vinl.policies.card import PolicyCard
 from vinl.policies.depth_policy import DepthNetwork, DepthPolicy, State
 from vinl.policies.policy import LocomotionPolicy, Policy
 from vinl.robot.cameras import Camera
+from vinl.sensing.preparation import prepare_depth
 
 
 class BatchedPolicy:
@@ -85,7 +86,7 @@ class BatchedPolicy:
             image = torch.zeros(len(some), 1, 1, device=self._device)
         else:
             seen = torch.as_tensor(depth)[some.to(depth.device) if isinstance(depth, Tensor) else some]
-            image = self.camera.normalise(seen.to(self._device, torch.float32))
+            image = prepare_depth(self.camera, seen.to(self._device, torch.float32))
         state = tuple(part[:, some] for part in self._state)
         answer, state = self._network(image[None], inputs[None], state, self._fresh[some][None])
         real = some[:count]

@@ -10,6 +10,7 @@ from vinl.nav.limits import Range, check_number, check_range
 from vinl.nav.ppo_config import NetworkConfig, PpoConfig
 from vinl.nav.robot_config import CameraConfig, ExecutionConfig, MotionConfig, RobotConfig, ViewConfig
 from vinl.policies.card import PREVIOUS
+from vinl.sensing.sensor_config import SensorConfig
 from vinl.world.homes.config import HomeConfig
 
 
@@ -154,6 +155,7 @@ class NavConfig:
         previous: what a robot knows of its last step: the ``action`` that it asked for [paper], its ``motion`` in the
             same units, (-1, 0) where the step was cancelled, or ``both``.
         camera: null: the robot is blind.
+        sensors: errors of the camera.
     """
 
     num_envs: int = 4096
@@ -164,6 +166,7 @@ class NavConfig:
     episodes: EpisodeConfig = field(default_factory=EpisodeConfig)
     robot: RobotConfig = field(default_factory=RobotConfig)
     camera: CameraConfig | None = field(default_factory=CameraConfig)
+    sensors: SensorConfig = field(default_factory=SensorConfig)
     motion: MotionConfig = field(default_factory=MotionConfig)
     execution: ExecutionConfig = field(default_factory=ExecutionConfig)
     clutter: ClutterConfig = field(default_factory=ClutterConfig)
@@ -181,5 +184,7 @@ class NavConfig:
             raise InputError(f"previous must be one of {', '.join(PREVIOUS)}, got {self.previous!r}")
         if not 0 <= self.seed < 2**31:
             raise InputError(f"seed must lie between 0 and 2147483647, got {self.seed}")
+        if self.camera is not None and self.camera.missing == "plane" and self.ppo.image_type == "uint8":
+            raise InputError("camera.missing=plane needs ppo.image_type=float16: a byte has no room for the mark")
         if self.execution.snag > 0 and self.robot.min_speed >= 0:
             raise InputError("execution.snag needs a way back: set robot.min_speed below 0")

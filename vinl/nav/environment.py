@@ -17,10 +17,15 @@ from vinl.nav.measures import EpisodeEnd, Measures, end_episodes
 from vinl.nav.motion_kernels import measure_robots, move_robots, place_robots
 from vinl.nav.robots import make_robots
 from vinl.nav.rules import write_rules
-from vinl.nav.view_kernels import aim_cameras, render_interior
+from vinl.nav.view_kernels import aim_cameras, draw_keys, render_interior
 from vinl.nav.way_kernel import point_ways
 from vinl.robot.cameras import Camera
 from vinl.sensing.depth import check_device
+from vinl.sensing.preparation import settle_missing
+from vinl.sensing.sensor import DepthSensor
+
+_DRAWN_AT_START, _DRAWN_AT_LOOK = 1, 3
+"""Rows of random numbers of a step: what the cameras are drawn from, and their images' errors."""
 
 DISTANCE_UNIT = 5.0
 """The observation holds the distance to the goal in this unit [m]."""
@@ -30,7 +35,8 @@ class NavStep(NamedTuple):
     """What a step gives.
 
     Attributes:
-        depth: (n, H, W) float16 in [0, 1]; of the new episode where done. (n, 0, 0) if the robots are blind.
+        depth: (n, H, W) float16 in [0, 1], pixels without a return dealt with as ``camera.missing`` says; of the new
+            episode where done. (n, 0, 0) if the robots are blind.
         vector: (n, 5) float32: distance to the goal / 5 m, cosine and sine of its bearing (left is positive), and the
             previous action or motion, 0 at the start; (n, 7) with both (``NavConfig.previous``). Of the new episode
             where done.
@@ -88,7 +94,13 @@ class NavEnvironment:
         self.state["action"] = self._zeros(n, 2)
         self.state["chance"] = self._zeros(2, dtype=torch.int32)
         self._moved, self._blocked, self._straight = (self._zeros(n) for _ in range(3))
-        self._eye = self._zeros(n, 3), self._zeros(n, 3, 3), self._zeros(n)
+        self._eye = self._zeros(n, 3), self._zeros(n, 3, 3)
+        self._sensor: DepthSensor | None = None
+        if self.camera is not None:
+            self._sensor = DepthSensor(config.sensors, self.camera, n, self.device)
+            self.state |= {f"camera_{name}": tensor for name, tensor in self._sensor.drawn.items()}
+        self._key = self._zeros(n, dtype=torch.int32)
+        self._rows = torch.arange(n, dtype=torch.int32, device=self.device)
         self._chosen = self._zeros(n, dtype=torch.bool)
         self._wrapped = {
             "chance": wp.from_torch(self.state["chance"]),
@@ -100,7 +112,7 @@ class NavEnvironment:
             "chosen": wp.from_torch(self._chosen),
             "eye": wp.from_torch(self._eye[0], dtype=wp.vec3),
             "turn": wp.from_torch(self._eye[1], dtype=wp.mat33),
-            "holes": wp.from_torch(self._eye[2]),
+            "key": wp.from_torch(self._key),
         }
         self._measures = Measures(self.device)
         self.ended: EpisodeEnd | None = None
@@ -290,6 +302,9 @@ class NavEnvironment:
             self.num_envs,
             [self.homes.homes, self._rules, "chance", "chosen", self._robots, "unplaced"],
         )
+        if self._sensor is not None and not self._sensor.config.is_ideal:
+            self._launch(draw_keys, self.num_envs, ["chance", _DRAWN_AT_START, "key"])
+            self._sensor.restart(self._key, self._chosen)
         for name in ("steps", "path", "collisions", "in_a_row"):
             state[name].masked_fill_(chosen, 0.0)
         state["action"].masked_fill_(chosen[:, None], 0.0)
@@ -305,15 +320,19 @@ class NavEnvironment:
         if self.config.previous == "both":
             last.insert(0, state["action"])
         vector = torch.cat([torch.stack([distance, bearing.cos(), bearing.sin()], 1), *last], 1)
-        if self.camera is None:
+        if self.camera is None or self._sensor is None:
             return torch.zeros(n, 0, 0, dtype=torch.float16, device=self.device), vector
         depth = torch.empty(n, self.camera.height, self.camera.width, dtype=torch.float16, device=self.device)
-        self._launch(aim_cameras, n, [self._rules, "chance", self._robots, "eye", "turn", "holes"])
+        self._launch(aim_cameras, n, [self._rules, "chance", self._robots, self._sensor.cameras, "eye", "turn"])
         self._launch(
             render_interior,
             tuple(depth.shape),
-            [self.homes.homes, self._rules, "chance", self._robots, "eye", "turn", "holes", wp.from_torch(depth)],
+            [self.homes.homes, self._rules, self._robots, "eye", "turn", wp.from_torch(depth)],
         )
+        if self._sensor.config.spoils:
+            self._launch(draw_keys, n, ["chance", _DRAWN_AT_LOOK, "key"])
+            depth = self._sensor.spoil(depth, self._rows, self._key, *self._eye, unit=self.camera.far)
+            depth = settle_missing(self.camera.missing, depth, ~(depth > 0))
         return depth, vector
 
     def _launch(self, kernel: Any, dim: int | tuple[int, ...], inputs: list[Any]) -> None:

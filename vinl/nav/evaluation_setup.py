@@ -18,6 +18,7 @@ from vinl.policies.card import PolicyCard, find_previous
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.policies.velocity_range import VelocityRange
+from vinl.sensing.sensor_config import load_sensors
 from vinl.world.readers import expand_paths, shipped_floorplans
 
 MOTIONS = {
@@ -42,6 +43,7 @@ class NavEvaluation:
         episodes: of each kind of home.
         seed: of starts, goals, headings and the camera's motion.
         motion: a key of ``MOTIONS``.
+        sensors: errors of the camera: ``ideal``, ``realistic``, ``training``, or a YAML file, see ``load_sensors``.
         distance: range of the geodesic distance at the start [m].
         steps: an episode ends after so many decisions of 0.5 s [paper code: 250].
         goals: in each home.
@@ -53,6 +55,7 @@ class NavEvaluation:
     episodes: int = 1000
     seed: int = 0
     motion: str = "walking"
+    sensors: str = "ideal"
     distance: tuple[float, float] = (5.0, 30.0)
     steps: int = 250
     goals: int = 8
@@ -113,6 +116,7 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
     if card is not None and card.camera is not None:
         trained = card.training.get("camera") or {}
         known = {k: card.camera[k] for k in ("pitch_down", "hfov", "width", "height", "far")}
+        known["missing"] = card.camera.get("missing", "as_is")
         assert config.camera is not None
         mount = {"mount_height": config.camera.mount_height}
         if rules.motion == "paper" and "mount_height" in trained:
@@ -147,6 +151,7 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
         seed=rules.seed,
         previous="action" if card is None else find_previous(card),
         camera=camera,
+        sensors=load_sensors(rules.sensors),
         episodes=episodes,
         homes=homes,
         clutter=replace(config.clutter, share=rules.clutter),

@@ -23,6 +23,7 @@ from vinl.nav.environment import NavEnvironment
 from vinl.nav.home_store import HomeStore
 from vinl.nav.measures import EpisodeEnd
 from vinl.nav.picture import draw_robot
+from vinl.sensing.preparation import MARK
 
 ID = "vinl/Nav-v0"
 _HOMES = 8
@@ -146,7 +147,7 @@ class NavEnv(gymnasium.Env):
             np.array(self._way or [self._position()]),
             float(state["yaw"]),
             environment.goals()[0].cpu().numpy(),
-            depth[0].float().cpu().numpy(),
+            depth[0].float().clamp(min=0.0).cpu().numpy(),
             environment.config.robot,
         )
 
@@ -192,7 +193,8 @@ def _describe_spaces(environment: NavEnvironment) -> tuple[Any, Any]:
     low[0], high[0] = 0, _FARTHEST
     parts: dict[str, spaces.Space[Any]] = {"vector": spaces.Box(low, high, dtype=np.float32)}
     if environment.camera is not None:
-        parts["depth"] = spaces.Box(0.0, 1.0, (environment.camera.height, environment.camera.width), np.float32)
+        least = MARK if environment.camera.missing == "plane" else 0.0
+        parts["depth"] = spaces.Box(least, 1.0, (environment.camera.height, environment.camera.width), np.float32)
     return spaces.Dict(parts), spaces.Box(-1.0, 1.0, (2,), np.float32)
 
 

@@ -61,8 +61,6 @@ class Rules:
     far: wp.float32
     ceiling_share: wp.float32
     ceiling: wp.vec2
-    noise: wp.float32
-    dropout: wp.float32
 
 
 @wp.func
@@ -197,7 +195,9 @@ def move_robots(
             w_end = float(0.0)
         v = float(0.0)
         v_end = float(0.0)
+        slip = float(0.0)
         blocked[n] = 1.0
+    robots.twist[n] = wp.vec3(v, slip, w)
     heading = yaw + w * rules.period
     robots.previous[n] = wp.vec2(a0, a1)
     if rules.sees_motion != 0:
@@ -277,6 +277,7 @@ def place_robots(
                 unplaced[n] = unplaced[n] + 1.0
     robots.speed[n] = mix(rules.start_speed, wp.randf(state))
     robots.yaw_rate[n] = 0.0
+    robots.twist[n] = wp.vec3(0.0, 0.0, 0.0)
     drift = rules.yaw_drift * (2.0 * wp.randf(state) - 1.0)
     speed_gain = mix(rules.speed_gain, wp.randf(state))
     yaw_gain = mix(rules.yaw_gain, wp.randf(state))

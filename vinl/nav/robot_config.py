@@ -52,6 +52,8 @@ class CameraConfig:
         far: farther, or nothing hit, reads as this, which is 1 in the normalised image [m].
         forward: the camera is so far ahead of the robot's middle [m].
         mount_height: of the camera above the floor when the robot stands [m].
+        missing: what becomes of pixels without a return before the network: ``fill``, ``plane`` or ``as_is``, see
+            ``vinl.robot.cameras.MISSING``.
     """
 
     pitch_down: float = 0.0
@@ -61,6 +63,7 @@ class CameraConfig:
     far: float = 10.0
     forward: float = 0.35
     mount_height: float = 0.36
+    missing: str = "fill"
 
     def __post_init__(self) -> None:
         self.record()
@@ -71,7 +74,14 @@ class CameraConfig:
     def record(self) -> Camera:
         """The camera fixed to the trunk, as policy cards keep it."""
         return Camera(
-            "navigation", (self.forward, 0.0, 0.0), self.pitch_down, self.hfov, self.width, self.height, self.far
+            "navigation",
+            (self.forward, 0.0, 0.0),
+            self.pitch_down,
+            self.hfov,
+            self.width,
+            self.height,
+            self.far,
+            self.missing,
         )
 
 
@@ -123,20 +133,14 @@ class ViewConfig:
     Attributes:
         ceiling_share: share of the episodes with a ceiling.
         ceiling: range of its height [m].
-        noise: standard deviation of a pixel's depth, as a share of the depth.
-        dropout: largest share of the pixels that read as the far limit; uniform from 0 for each image.
     """
 
     ceiling_share: float = 0.6
     ceiling: Range = (2.4, 3.4)
-    noise: float = 0.0
-    dropout: float = 0.0
 
     def __post_init__(self) -> None:
         check_number("view.ceiling_share", self.ceiling_share, 0.0, 1.0)
         check_range("view.ceiling", self.ceiling, 1.0, 20.0)
-        check_number("view.noise", self.noise, 0.0, 1.0)
-        check_number("view.dropout", self.dropout, 0.0, 1.0)
 
 
 @dataclass(frozen=True)

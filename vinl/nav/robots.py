@@ -25,6 +25,7 @@ class Robots:
     yaw: wp.array(dtype=wp.float32)
     speed: wp.array(dtype=wp.float32)
     yaw_rate: wp.array(dtype=wp.float32)
+    twist: wp.array(dtype=wp.vec3)  # forward, sideways [m/s] and yaw rate [rad/s] of the last step as it was made
     distance: wp.array(dtype=wp.float32)
     gain: wp.array(dtype=wp.vec4)  # of forward speed and yaw rate, yaw drift [rad/s], and factor on the noises
     mount: wp.array(dtype=wp.vec4)  # roll, pitch, height of this episode's camera, height of the ceiling (0: none)
@@ -43,6 +44,7 @@ _STATE = {
     "yaw": (torch.float32, (), None),
     "speed": (torch.float32, (), None),
     "yaw_rate": (torch.float32, (), None),
+    "twist": (torch.float32, (3,), wp.vec3),
     "distance": (torch.float32, (), None),
     "gain": (torch.float32, (4,), wp.vec4),
     "mount": (torch.float32, (4,), wp.vec4),

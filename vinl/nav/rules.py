@@ -44,7 +44,6 @@ def write_rules(config: NavConfig) -> Any:
     rules.height_offset, rules.height_shake = motion.height_offset, motion.height_shake
     rules.with_trunk = int(motion.with_trunk)
     rules.ceiling_share, rules.ceiling = view.ceiling_share, wp.vec2(*view.ceiling)
-    rules.noise, rules.dropout = view.noise, view.dropout
     camera = config.camera
     if camera is not None:
         rules.forward, rules.mount_height, rules.pitch_down = camera.forward, camera.mount_height, camera.pitch_down

@@ -9,9 +9,10 @@ from typing import no_type_check
 import warp as wp
 
 from vinl.nav.grids import Homes
-from vinl.nav.motion_kernels import Rules
+from vinl.nav.motion_kernels import Rules, place_after
 from vinl.nav.robots import Robots
 from vinl.sensing.kernels import look_through
+from vinl.sensing.sensor_kernels import Cameras
 from vinl.sensing.warp_start import start_warp
 
 start_warp()
@@ -20,15 +21,23 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.kernel
 @no_type_check
+def draw_keys(seed: wp.array(dtype=wp.int32), salt: wp.int32, key: wp.array(dtype=wp.int32)):
+    """A number for each robot and step that other random numbers follow from."""
+    n = wp.tid()
+    key[n] = wp.int32(wp.rand_init(seed[0] + 4 * seed[1] + salt, n) & wp.uint32(2147483647))
+
+
+@wp.kernel
+@no_type_check
 def aim_cameras(
     rules: Rules,
     seed: wp.array(dtype=wp.int32),
     robots: Robots,
+    cameras: Cameras,
     position: wp.array(dtype=wp.vec3),
     rotation: wp.array(dtype=wp.mat33),
-    holes: wp.array(dtype=wp.float32),
 ):
-    """Where each camera is and where it looks in this step; the share of its pixels that read as the far limit."""
+    """Where each camera was and where it looked when it took the image of this step."""
     n = wp.tid()
     state = wp.rand_init(seed[0] + 4 * seed[1] + 2, n)
     mount = robots.mount[n]
@@ -37,6 +46,12 @@ def aim_cameras(
     pitch = mount[1] + rules.tilt_shake[1] * sway[1] + rules.tilt_uniform * (2.0 * wp.randf(state) - 1.0)
     height = rules.mount_height + mount[2] + rules.height_shake * sway[2]
     yaw = robots.yaw[n]
+    p = robots.position[n]
+    delay = cameras.delay[n]
+    if delay > 0.0:  # back along the arc that the robot came on
+        twist = robots.twist[n]
+        p = place_after(p, yaw, -twist[0], -twist[1], -twist[2], wp.vec2(0.0, 0.0), delay)
+        yaw = yaw - delay * twist[2]
     cy = wp.cos(yaw)
     sy = wp.sin(yaw)
     cp = wp.cos(pitch)
@@ -48,6 +63,15 @@ def aim_cameras(
     cd = wp.cos(rules.pitch_down)
     sd = wp.sin(rules.pitch_down)
     rest = wp.mat33(cd, 0.0, sd, 0.0, 1.0, 0.0, -sd, 0.0, cd)
+    off = cameras.offset[n]
+    if off[0] != 0.0 or off[1] != 0.0 or off[2] != 0.0:  # as it was mounted
+        co = wp.cos(off[0])
+        so = wp.sin(off[0])
+        ce = wp.cos(off[1])
+        se = wp.sin(off[1])
+        rest = rest * wp.mat33(ce, 0.0, se, 0.0, 1.0, 0.0, -se, 0.0, ce)
+        rest = rest * wp.mat33(1.0, 0.0, 0.0, 0.0, co, -so, 0.0, so, co)
+        height = height + off[2]
     ahead = wp.vec3(rules.forward, 0.0, 0.0)
     if rules.with_trunk != 0:
         rotation[n] = turn * tilt * rest
@@ -56,9 +80,7 @@ def aim_cameras(
         # the camera turns about itself: roll about its own axis, pitch about its own side
         rotation[n] = turn * rest * tilt
         ahead = turn * ahead
-    p = robots.position[n]
     position[n] = wp.vec3(p[0] + ahead[0], p[1] + ahead[1], wp.max(height + ahead[2], 0.05))
-    holes[n] = rules.dropout * wp.randf(state)
 
 
 @wp.kernel
@@ -66,11 +88,9 @@ def aim_cameras(
 def render_interior(
     homes: Homes,
     rules: Rules,
-    seed: wp.array(dtype=wp.int32),
     robots: Robots,
     position: wp.array(dtype=wp.vec3),
     rotation: wp.array(dtype=wp.mat33),
-    holes: wp.array(dtype=wp.float32),
     depth: wp.array(dtype=wp.float16, ndim=3),
 ):
     """Depth along the optical axis as a share of the far limit, one thread a pixel. Floor and ceiling are planes: no
@@ -87,10 +107,4 @@ def render_interior(
     hit = wp.mesh_query_ray(homes.meshes[robots.home[n]], origin, direction, far)
     if hit.result:
         far = wp.min(hit.t, far)
-    if rules.noise > 0.0 or rules.dropout > 0.0:
-        pixel = (n * depth.shape[1] + row) * depth.shape[2] + column
-        state = wp.rand_init(seed[0] + 4 * seed[1] + 3, pixel)
-        if wp.randf(state) < holes[n]:
-            far = rules.far
-        far = wp.clamp(far * (1.0 + rules.noise * wp.randn(state)), 0.0, rules.far)
     depth[n, row, column] = wp.float16(far / rules.far)

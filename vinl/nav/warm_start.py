@@ -33,6 +33,7 @@ def build_actor(config: NavConfig) -> NavActor:
         memory=n.memory,
         planes=n.planes,
         previous=PREVIOUS_SIZE * (2 if config.previous == "both" else 1),
+        channels=2 if c is not None and c.missing == "plane" else 1,
     )
 
 

@@ -31,6 +31,7 @@ class DepthMemory(nn.Module):
         layers: of the memory.
         memory: ``"lstm"``, or ``"mlp"``: as many ReLU layers of the same width, which remember nothing [paper IV-B].
         planes: channels of the ResNet's first stage.
+        channels: of the images: 1, or 2 with one for the pixels that are marked as lost.
 
     Raises:
         ValueError: unknown ``vision`` or ``memory``.
@@ -47,15 +48,16 @@ class DepthMemory(nn.Module):
         layers: int,
         memory: str = "lstm",
         planes: int = 32,
+        channels: int = 1,
     ) -> None:
         super().__init__()
         if vision not in VISIONS or memory not in MEMORIES:
             raise ValueError(f"vision is one of {VISIONS}, memory one of {MEMORIES}; got {vision!r} and {memory!r}")
         self.vision: Vision | None = None
         if vision == "cnn":
-            self.vision = SmallCnn(height, width, visual)
+            self.vision = SmallCnn(height, width, visual, channels)
         elif vision == "resnet18":
-            self.vision = ResNet18(height, width, visual, planes)
+            self.vision = ResNet18(height, width, visual, planes, channels)
         self.image = None if vision == "none" else (height, width)
         self.hidden, self.layers, self.remembers = hidden, layers, memory == "lstm"
         size = vector + (visual if self.vision is not None else 0)

@@ -15,6 +15,7 @@ from vinl.policies.card import PolicyCard
 from vinl.policies.networks import PolicyNetwork
 from vinl.policies.policy import A
 from vinl.robot.cameras import Camera
+from vinl.sensing.preparation import prepare_depth
 
 State = tuple[Tensor, ...]
 """What a network remembers: tensors (layers, n, hidden), one column a robot; none without memory."""
@@ -84,7 +85,8 @@ class DepthPolicy:
 
         Args:
             observation: (n, k) in the order of the card's observation table, numpy or torch, any float type.
-            depth: (n, height, width) of ``camera`` [m], numpy or torch; None if the policy is blind.
+            depth: (n, height, width) of ``camera`` [m], numpy or torch, 0 or less for a pixel without a return; None if
+                the policy is blind.
 
         Returns:
             (n, a) of the observation's kind and on its device; numpy as float32.
@@ -113,7 +115,7 @@ class DepthPolicy:
         self._fresh = torch.ones(n, dtype=torch.bool, device=self.device)
 
     def _see(self, depth: Any, n: int) -> Float[Tensor, "n height width"]:
-        """Depth as the network takes it: normalised by the camera record."""
+        """Depth as the network takes it: normalised by the camera record, pixels without a return dealt with."""
         if self.camera is None:
             return torch.zeros(n, 1, 1, device=self.device)
         shape = (n, self.camera.height, self.camera.width)
@@ -121,7 +123,7 @@ class DepthPolicy:
             raise ValueError(
                 f"{self.card.name} sees depth {shape}, got {None if depth is None else tuple(depth.shape)}"
             )
-        return self.camera.normalise(torch.as_tensor(depth, dtype=torch.float32, device=self.device))
+        return prepare_depth(self.camera, torch.as_tensor(depth, dtype=torch.float32, device=self.device))
 
 
 def read_camera(card: PolicyCard, image: tuple[int, int] | None) -> Camera | None:
@@ -132,7 +134,7 @@ def read_camera(card: PolicyCard, image: tuple[int, int] | None) -> Camera | Non
         image: height and width that the network takes.
 
     Raises:
-        InputError: the record is missing or broken, or its image size is not the network's.
+        InputError: the record is missing or broken, or its image size or its planes are not the network's.
     """
     if image is None:
         return None
@@ -144,5 +146,10 @@ def read_camera(card: PolicyCard, image: tuple[int, int] | None) -> Camera | Non
         raise InputError(
             f"{source}: the image of the card is {camera.width} x {camera.height} pixels, "
             f"the network takes {image[1]} x {image[0]}"
+        )
+    channels = int(card.network.get("channels", 1))
+    if (camera.missing == "plane") != (channels == 2):
+        raise InputError(
+            f"{source}: missing is {camera.missing!r}, but the network takes {channels} channels; plane goes with 2"
         )
     return camera

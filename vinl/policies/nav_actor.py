@@ -33,6 +33,7 @@ class NavActor(PolicyNetwork):
         memory: ``"lstm"`` or ``"mlp"``.
         planes: channels of the ResNet's first stage.
         previous: numbers on the last step: 2 of the action or the motion, 4 of both.
+        channels: of the image: 1, or 2 with one for the pixels without a return.
 
     Attributes:
         image: (height, width) [pixels], or None if blind.
@@ -54,6 +55,7 @@ class NavActor(PolicyNetwork):
         memory: str = "lstm",
         planes: int = 32,
         previous: int = PREVIOUS_SIZE,
+        channels: int = 1,
     ) -> None:
         super().__init__()
         self.observation_size = GOAL_SIZE + previous
@@ -68,10 +70,13 @@ class NavActor(PolicyNetwork):
             "memory": memory,
             "planes": planes,
             "previous": previous,
+            "channels": channels,
         }
         self.goal = nn.Linear(GOAL_SIZE, embedding)
         self.previous = nn.Linear(previous, embedding)
-        self.memory = DepthMemory(vision, height, width, 2 * embedding, visual, hidden, layers, memory, planes)
+        self.memory = DepthMemory(
+            vision, height, width, 2 * embedding, visual, hidden, layers, memory, planes, channels
+        )
         self.image, self.feature_size = self.memory.image, hidden
         self.mean = nn.Linear(hidden, ACTION_SIZE)
         nn.init.orthogonal_(self.mean.weight, _MEAN_GAIN)

@@ -23,12 +23,16 @@ class Vision(nn.Module):
     """An image with values in [0, 1] to a vector. Under autocast the convolutions run in the reduced type.
 
     Attributes:
-        layers: from (n, 1, H, W) to (n, size), ReLU at the end.
+        layers: from (n, channels, H, W) to (n, size), ReLU at the end.
+        channels: 1, or 2: depth, and 1 where the image is marked as lost (``vinl.sensing.preparation.MARK``).
         channels_last: whether the images go in with channels last, which is faster without norms in between.
+        pool: images are averaged over squares of so many pixels first.
     """
 
     layers: nn.Sequential
+    channels: int = 1
     channels_last: bool = False
+    pool: int = 1
 
     def forward(self, images: Float[Tensor, "n height width"]) -> Float[Tensor, "n size"]:
         """Feature vectors, float32 or the type of autocast."""
@@ -36,7 +40,11 @@ class Vision(nn.Module):
         wanted = torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else next(self.parameters()).dtype
         images = images.to(wanted)
         # one channel: (n, H, W, 1) turned round has the strides of "channels last" without a copy
-        return self.layers(images[..., None].permute(0, 3, 1, 2) if self.channels_last else images[:, None])
+        if self.channels == 2:
+            planes = torch.stack([images.clamp(min=0.0), (images < 0.0).to(wanted)], -1).permute(0, 3, 1, 2)
+        else:
+            planes = images[..., None].permute(0, 3, 1, 2) if self.channels_last else images[:, None]
+        return self.layers(functional.avg_pool2d(planes, self.pool) if self.pool > 1 else planes)
 
 
 class SmallCnn(Vision):
@@ -47,10 +55,11 @@ class SmallCnn(Vision):
 
     channels_last = True
 
-    def __init__(self, height: int, width: int, size: int) -> None:
+    def __init__(self, height: int, width: int, size: int, channels: int = 1) -> None:
         super().__init__()
+        self.channels = channels
         small = min(height, width) < _SMALL
-        first = nn.Conv2d(1, 32, 5, 2, 2) if small else nn.Conv2d(1, 32, 8, 4)
+        first = nn.Conv2d(channels, 32, 5, 2, 2) if small else nn.Conv2d(channels, 32, 8, 4)
         pad = 1 if small else 0
         maps = nn.Sequential(
             first,
@@ -68,11 +77,12 @@ class SmallCnn(Vision):
 class ResNet18(Vision):
     """ResNet-18 with GroupNorm and a compressed map [ViNL resnet_policy.py and resnet.py]."""
 
-    def __init__(self, height: int, width: int, size: int, planes: int = 32) -> None:
+    def __init__(self, height: int, width: int, size: int, planes: int = 32, channels: int = 1) -> None:
         super().__init__()
+        self.channels = channels
         p = planes
         maps = nn.Sequential(
-            nn.Conv2d(1, p, 7, 2, 3, bias=False),
+            nn.Conv2d(channels, p, 7, 2, 3, bias=False),
             GroupNorm(16, p),
             nn.ReLU(),
             nn.MaxPool2d(3, 2, 1),
@@ -83,21 +93,17 @@ class ResNet18(Vision):
         )
         self.pool = 2 if min(height, width) >= _LARGE else 1
         cells = _count(maps, height // self.pool, width // self.pool) // (8 * p)
-        channels = max(round(_COMPRESSED / cells), 1)
+        kept = max(round(_COMPRESSED / cells), 1)
         self.layers = nn.Sequential(
             *maps,
-            nn.Conv2d(8 * p, channels, 3, 1, 1, bias=False),
-            GroupNorm(1, channels),
+            nn.Conv2d(8 * p, kept, 3, 1, 1, bias=False),
+            GroupNorm(1, kept),
             nn.ReLU(),
             nn.Flatten(),
-            nn.Linear(channels * cells, size),
+            nn.Linear(kept * cells, size),
             nn.ReLU(),
         )
         _start_weights(self)
-
-    def forward(self, images: Float[Tensor, "n height width"]) -> Float[Tensor, "n size"]:
-        """Feature vectors, float32 or the type of autocast."""
-        return super().forward(functional.avg_pool2d(images, self.pool) if self.pool > 1 else images)
 
 
 class GroupNorm(nn.GroupNorm):

@@ -10,6 +10,10 @@ import numpy as np
 
 from vinl.config.errors import InputError
 
+MISSING = ("as_is", "fill", "plane")
+"""What a policy's preparation does with pixels without a return: it leaves the image as it is, which then reads as the
+far limit there; fills them from their neighbours; or hands their places to the network as a second plane."""
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -22,6 +26,8 @@ class Camera:
         hfov: horizontal field of view [rad]; pixels are square, the vertical one follows from the image size.
         width, height: image size [pixels].
         far: what is farther, or nothing hit, reads as this [m].
+        missing: what becomes of pixels without a return before the network, one of ``MISSING``, see
+            ``vinl.sensing.preparation``.
     """
 
     name: str
@@ -31,6 +37,7 @@ class Camera:
     width: int
     height: int
     far: float
+    missing: str = "as_is"
 
     def __post_init__(self) -> None:
         if not 0 < self.hfov < math.pi:
@@ -39,6 +46,8 @@ class Camera:
             raise InputError(f"camera {self.name}: image size must be positive, got {self.width} x {self.height}")
         if self.far <= 0:
             raise InputError(f"camera {self.name}: far must be positive, got {self.far}")
+        if self.missing not in MISSING:
+            raise InputError(f"camera {self.name}: missing must be one of {', '.join(MISSING)}, got {self.missing!r}")
 
     @property
     def tan_half(self) -> tuple[float, float]:

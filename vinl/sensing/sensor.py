@@ -1,0 +1,111 @@
+"""A depth camera with the errors of a real one, in the place of an ideal one: the same kernels on CPU and GPU."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+import warp as wp
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from vinl.robot.cameras import Camera
+from vinl.sensing.sensor_config import SensorConfig
+from vinl.sensing.sensor_kernels import Cameras, SensorRules, draw_cameras, spoil_depth
+
+_DRAWN = {
+    "amplitude": (torch.float32, (), None),
+    "scale": (torch.float32, (), None),
+    "offset": (torch.float32, (3,), wp.vec3),
+    "delay": (torch.float32, (), None),
+    "surfaces": (torch.int32, (), None),
+}
+"""Type and shape of each entry of ``Cameras`` for one camera, and what a row of it is to Warp."""
+
+
+class DepthSensor:
+    """The depth cameras of n robots: what is drawn for each of them, and what becomes of their images.
+
+    Args:
+        config: their errors.
+        camera: the record of the ideal camera.
+        n: robots.
+        device: of the images.
+
+    Attributes:
+        config: as given.
+        drawn: tensors (n, ...) by the names of ``sensor_kernels.Cameras``: what an episode keeps.
+        cameras: the same memory as kernels read it.
+    """
+
+    def __init__(self, config: SensorConfig, camera: Camera, n: int, device: torch.device | str = "cpu") -> None:
+        self.config, self._camera, self._device = config, camera, torch.device(device)
+        self.drawn = {
+            name: torch.zeros(n, *shape, dtype=dtype, device=device) for name, (dtype, shape, _) in _DRAWN.items()
+        }
+        self.drawn["scale"].fill_(1.0)
+        self.cameras = Cameras()
+        for name, (_, _, vector) in _DRAWN.items():
+            setattr(self.cameras, name, wp.from_torch(self.drawn[name], dtype=vector))
+        self._rules = _write_rules(config)
+        self._lost = camera.far if camera.missing == "as_is" else 0.0
+
+    def restart(self, key: Int[Tensor, " n"], chosen: Bool[Tensor, " n"]) -> None:
+        """Draw the chosen cameras anew, each from its key alone."""
+        if not self.config.is_ideal:
+            inputs = [self._rules, wp.from_torch(key), wp.from_torch(chosen), self.cameras]
+            self._launch(draw_cameras, len(key), inputs)
+
+    def spoil(
+        self,
+        images: Float[Tensor, "k height width"],
+        rows: Int[Tensor, " k"],
+        key: Int[Tensor, " k"],
+        position: Float[Tensor, "k 3"],
+        rotation: Float[Tensor, "k 3 3"],
+        unit: float = 1.0,
+    ) -> Float[Tensor, "k height width"]:
+        """Images as the cameras give them; the very same tensor from an ideal camera.
+
+        Args:
+            images: depth along the optical axis, float16 or float32.
+            rows: whose images they are, int32.
+            key: int32, that the random numbers of each image follow from.
+            position, rotation: of the optical centres in the world [m], and camera to world.
+            unit: so many metres are 1 in an image.
+
+        Returns:
+            New images of the same type. A pixel without a return reads 0, or the far limit where the camera's record
+            leaves images as they are (``Camera.missing``).
+        """
+        if not self.config.spoils or not len(images):
+            return images
+        spoilt = torch.empty_like(images)
+        inputs = [
+            self._rules,
+            self.cameras,
+            wp.from_torch(rows),
+            wp.from_torch(key),
+            wp.from_torch(position.contiguous(), dtype=wp.vec3),
+            wp.from_torch(rotation.contiguous(), dtype=wp.mat33),
+            wp.vec2(*self._camera.tan_half),
+            self._camera.far,
+            unit,
+            self._lost / unit,
+            wp.from_torch(images.contiguous()),
+            wp.from_torch(spoilt),
+        ]
+        self._launch(spoil_depth, tuple(images.shape), inputs)
+        return spoilt
+
+    def _launch(self, kernel: Any, dim: int | tuple[int, ...], inputs: list[Any]) -> None:
+        on_gpu = self._device.type == "cuda"
+        stream = wp.stream_from_torch(torch.cuda.current_stream(self._device)) if on_gpu else None
+        wp.launch(kernel, dim=dim, inputs=inputs, device=str(self._device), stream=stream)
+
+
+def _write_rules(config: SensorConfig) -> Any:
+    rules = SensorRules()
+    for name, value in vars(config).items():
+        setattr(rules, name, wp.vec2(*value) if isinstance(value, tuple) else value)
+    return rules

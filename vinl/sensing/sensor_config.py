@@ -1,0 +1,110 @@
+"""What a real depth camera does to an image, as a frozen record whose values live in ``configs/sensors/*.yaml``."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from vinl.config.errors import InputError
+from vinl.config.loader import load_config
+
+Range = tuple[float, float]
+"""From least to most."""
+
+LIMITS = {
+    "noise": (0.0, 1.0),
+    "scale": (0.0, 0.5),
+    "pixels": (0.0, 1.0),
+    "patches": (0.0, 1.0),
+    "edges": (0.0, 1.0),
+    "edge_step": (0.01, 10.0),
+    "surfaces": (0.0, 1.0),
+    "surface_size": (0.05, 10.0),
+    "roll": (0.0, 0.5),
+    "pitch": (0.0, 0.5),
+    "height": (0.0, 0.2),
+}
+"""Limits of the single numbers of ``SensorConfig``."""
+
+RANGES = {"patch_size": (0.01, 1.0), "range": (0.0, 1000.0), "delay": (0.0, 0.4), "amplitude": (0.0, 10.0)}
+"""Limits of its ranges. A delay stays below the 0.5 s between two decisions."""
+
+
+@dataclass(frozen=True)
+class SensorConfig:
+    """Errors of a depth camera; the defaults are an ideal one. A pixel without a return reads 0 [librealsense].
+
+    What differs from camera to camera is drawn once for each robot at the start of an episode: ``amplitude``,
+    ``scale``, ``roll``, ``pitch``, ``height``, ``delay``, and which surfaces return nothing.
+
+    Attributes:
+        noise: standard deviation of a pixel's depth as a multiple of the depth squared [1/m]; of a stereo camera
+            sub-pixel error / (focal length in pixels x baseline).
+        scale: all depths are off by a factor, uniform within 1 +- this.
+        pixels: fraction of the pixels without a return, each by itself.
+        patches: fraction of the image without a return in round patches, expected.
+        patch_size: range of their diameter, as a fraction of the image's width.
+        edges: fraction of the pixels beside a step in depth without a return: one of the two imagers does not see them.
+        edge_step: a neighbour that is nearer by more than this, relative to the pixel's own depth, makes such a step.
+        surfaces: fraction of the surfaces that never return anything: glass, mirrors, dark cloth. They stay where they
+            are while the robot moves.
+        surface_size: side of such a surface [m].
+        range: nearer and from the far end on nothing returns [m].
+        delay: range of the age of an image when the policy gets it [s].
+        roll, pitch: the camera is mounted off by an angle, uniform within +- this [rad].
+        height: and off in height, uniform within +- this [m].
+        amplitude: range of a factor on ``noise``, ``pixels``, ``patches``, ``edges`` and ``surfaces``, uniform.
+    """
+
+    noise: float = 0.0
+    scale: float = 0.0
+    pixels: float = 0.0
+    patches: float = 0.0
+    patch_size: Range = (0.05, 0.25)
+    edges: float = 0.0
+    edge_step: float = 0.3
+    surfaces: float = 0.0
+    surface_size: float = 0.5
+    range: Range = (0.0, 1000.0)
+    delay: Range = (0.0, 0.0)
+    roll: float = 0.0
+    pitch: float = 0.0
+    height: float = 0.0
+    amplitude: Range = (1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        for name, (least, most) in LIMITS.items():
+            value = getattr(self, name)
+            if not (math.isfinite(value) and least <= value <= most):
+                raise InputError(f"sensors.{name} must lie between {least:g} and {most:g}, got {value:g}")
+        for name, (least, most) in RANGES.items():
+            low, high = getattr(self, name)
+            if not (math.isfinite(low) and math.isfinite(high) and least <= low <= high <= most):
+                raise InputError(
+                    f"sensors.{name} must be a rising range within {least:g} to {most:g}, got {low:g} to {high:g}"
+                )
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether images come out as they go in, and from where the camera is."""
+        return not (self.spoils or self.moves)
+
+    @property
+    def spoils(self) -> bool:
+        """Whether depths change."""
+        errors = (self.noise, self.scale, self.pixels, self.patches, self.edges, self.surfaces)
+        return any(errors) or self.range != SensorConfig.range
+
+    @property
+    def moves(self) -> bool:
+        """Whether images are taken from another place or at another time than the ideal camera's."""
+        return any((self.roll, self.pitch, self.height)) or self.delay[1] > 0
+
+
+def load_sensors(name: str) -> SensorConfig:
+    """The errors of a camera by the name of a config in ``configs/sensors``, or from a YAML file.
+
+    Raises:
+        InputError: there is no such config, or it cannot be used.
+    """
+    return load_config(SensorConfig, name if name.endswith((".yaml", ".yml")) else f"sensors/{name}")
