@@ -30,13 +30,13 @@ class GaitConfig:
 
     stride: float = 0.48
     period: tuple[float, float] = (0.6, 1.2)
-    swing_time: float = 0.45
+    swing_time: float = 0.6
     swing_fraction: float = 0.45
     stance: tuple[float, float] = (0.24, 0.15)
     hip_height: float = 0.43
     lift: float = 0.08
     edge: float = 0.035
-    shank: float = 0.035
+    shank: float = 0.03
     map: bool = True
     modulate: float = 0.4
 

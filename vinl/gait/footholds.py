@@ -17,7 +17,6 @@ from vinl.gait.state import (
     GaitState,
     Plan,
     raibert,
-    raibert_at,
     stance_places,
     stance_time,
     swings,
@@ -76,7 +75,11 @@ def plan_footholds(
     nominal, heading = raibert(xp, config, gait, velocity, command)
     candidates = constant(xp, CANDIDATES, level)
     points = nominal[:, :, None] + turn(xp, heading[..., None], candidates[None, None])
-    cost = obstruction(xp, config, view, gait, command, points, heading, candidates[:, 0])
+    tracks, leans = _tracks(xp, nominal, heading, command)
+    everywhere = xp.concatenate([points, tracks], 2)
+    along = xp.concatenate([candidates[:, 0], leans])
+    blocked = obstruction(xp, config, view, gait, command, everywhere, heading, along)
+    cost, blocked = blocked[..., : len(CANDIDATES)], blocked[..., len(CANDIDATES) :]
     side = constant(xp, np.sign(stance_places(config)[:, 1]), level)[:, None]
     inward = xp.clip(-candidates[:, 1] * side - _INWARD[0], 0.0, None) / _INWARD[1]
     cost = cost + ((candidates[:, 0] / _WIDTH[0]) ** 2 + (candidates[:, 1] / _WIDTH[1]) ** 2 + inward**2)
@@ -92,7 +95,7 @@ def plan_footholds(
     way = start[..., None, :2] + (chosen - start[..., :2])[..., None, :] * constant(xp, PATH, level)[:, None]
     over = xp.max(view.crest(way), -1) + FOOT_RADIUS - base
     apex = xp.maximum(over, xp.clip(rise, 0.0, None)) + config.lift
-    return Plan(offset, rise, apex, choose_rates(xp, config, view, gait, command))
+    return Plan(offset, rise, apex, _choose_rates(xp, config, gait, command, blocked))
 
 
 def obstruction(
@@ -119,21 +122,22 @@ def obstruction(
         (n, 4, k), 0 where nothing is in the way.
     """
     ground = view.height(points) + FOOT_RADIUS
-    cost = _price(xp, FOOT_RADIUS + config.edge - view.clearance(xp.concatenate([points, ground[..., None]], -1)), 0)
     sweep = command[:, 0] * stance_time(xp, config, gait)
     stance = constant(xp, stance_places(config)[:, 0] - HIPS[:, 0].astype(np.float32), along)
     touch_down = (stance + sweep[:, None] / 2)[..., None] + along
-    hip = along * 0 + (config.hip_height - FOOT_RADIUS)
-    worst = 0.0
-    reach = farthest(xp, hip)
-    for ahead in (touch_down, touch_down - sweep[:, None, None]):
-        back, up = knee_from_foot(xp, ahead, hip)
-        for part in SHANK_FRACTIONS:
-            place = points + turn(xp, heading[..., None], xp.stack([part * back, 0 * back], -1))
-            at = xp.concatenate([place, (ground + part * up)[..., None]], -1)
-            worst = xp.maximum(worst, _price(xp, config.shank - view.clearance(at), 1))
-        cost = cost + _OUT_OF_REACH * xp.clip(xp.abs(ahead) - reach, 0.0, None)
-    return cost + worst
+    ahead = xp.stack([touch_down, touch_down - sweep[:, None, None]], -1)  # (n, 4, k, 2)
+    hip = config.hip_height - FOOT_RADIUS
+    back, up = knee_from_foot(xp, ahead, hip + 0 * ahead)
+    parts = constant(xp, np.array(SHANK_FRACTIONS, np.float32), along)
+    back, up = ((x[..., None] * parts).reshape(*x.shape[:-1], 2 * len(SHANK_FRACTIONS)) for x in (back, up))
+    behind = xp.stack([xp.cos(heading), xp.sin(heading)], -1)[:, :, None, None] * back[..., None]
+    leg = xp.concatenate([points[..., None, :] + behind, (ground[..., None] + up)[..., None]], -1)
+    foot = xp.concatenate([points, ground[..., None]], -1)[..., None, :]
+    gap = view.clearance(xp.concatenate([foot, leg], -2))
+    short = xp.max(config.shank - gap[..., 1:], -1)
+    too_far = xp.clip(xp.abs(ahead) - farthest(xp, 0 * along[0] + hip), 0.0, None).sum(-1)
+    touches = _price(xp, FOOT_RADIUS + config.edge - gap[..., 0], 0) + _price(xp, short, 1)
+    return touches + _OUT_OF_REACH * too_far
 
 
 def _price(xp: Any, lack: Any, kind: int) -> Any:
@@ -165,31 +169,39 @@ _LEANS = (-0.165, 0.0, 0.165)
 the farther back its shank leans."""
 
 
-def choose_rates(xp: Any, config: GaitConfig, view: GroundView, gait: GaitState, command: Any) -> Any:
+def _tracks(xp: Any, nominal: Any, heading: Any, command: Any) -> tuple[Any, Any]:
+    """(n, 4, 93, 2) places along the track of each foot, once for each of ``_LEANS``, and (93,) these [m]."""
+    track = constant(xp, TRACK.astype(np.float32), nominal)
+    course = command[:, :2] / xp.clip(_speed(xp, command), _LEAST_SPEED, None)[:, None]
+    direction = turn(xp, heading, course[:, None] + 0 * nominal)
+    places = nominal[:, :, None] + direction[:, :, None] * track[:, None]
+    leans = constant(xp, np.repeat(_LEANS, len(TRACK)).astype(np.float32), nominal)
+    return xp.concatenate([places] * len(_LEANS), 2), leans
+
+
+def _speed(xp: Any, command: Any) -> Any:
+    return xp.sqrt(command[:, 0] ** 2 + command[:, 1] ** 2)
+
+
+def _choose_rates(xp: Any, config: GaitConfig, gait: GaitState, command: Any, blocked: Any) -> Any:
     """(n, 4) the rates at which the next footholds of every foot ask for the smallest offsets.
 
-    Each foot's track is looked at once; what a foothold would cost whose Raibert place is at any of its places follows
-    from it, and with that the cost of every rate. Legs that leave the trot are drawn back to it.
+    ``blocked`` (n, 4, 93) is what is in the way along the tracks; what a foothold would cost whose Raibert place is at
+    any of their places follows from it, and with that the cost of every rate. Legs that leave the trot are drawn back.
     """
     if config.modulate == 0:
         return 0 * gait.rate + 1.0
-    left = time_to_touch_down(xp, config, gait)
-    first, heading = raibert_at(xp, config, gait, command[:, :2], command, left)
-    track = constant(xp, TRACK.astype(np.float32), first)
-    speed = xp.sqrt(command[:, 0] ** 2 + command[:, 1] ** 2)
-    course = command[:, :2] / xp.clip(speed, _LEAST_SPEED, None)[:, None]
-    direction = turn(xp, heading, course[:, None] + 0 * first)
-    places = first[:, :, None] + direction[:, :, None] * track[:, None]
-    blocked = [obstruction(xp, config, view, gait, command, places, heading, 0 * track + lean) for lean in _LEANS]
-    spread = len(ALONG) // 2
-    padded = [xp.concatenate([b[..., :1]] * spread + [b] + [b[..., -1:]] * spread, -1) for b in blocked]
-    windows = []
+    left, speed = time_to_touch_down(xp, config, gait), _speed(xp, command)
+    spread, long = len(ALONG) // 2, len(TRACK)
+    by_lean = [blocked[..., k * long : (k + 1) * long] for k in range(len(_LEANS))]
+    padded = [xp.concatenate([b[..., :1]] * spread + [b] + [b[..., -1:]] * spread, -1) for b in by_lean]
+    cost = None
     for k, shift in enumerate(ALONG):
         nearest = int(np.abs(np.array(_LEANS) - shift).argmin())
-        windows.append(padded[nearest][..., k : k + len(TRACK)] + float((shift / _WIDTH[0]) ** 2))
-    cost = xp.min(xp.stack(windows, -1), -1)  # (n, 4, track)
+        window = padded[nearest][..., k : k + long] + float((shift / _WIDTH[0]) ** 2)
+        cost = window if cost is None else xp.minimum(cost, window)
 
-    rates = constant(xp, np.linspace(1 - config.modulate, 1 + config.modulate, RATES, dtype=np.float32), first)
+    rates = constant(xp, np.linspace(1 - config.modulate, 1 + config.modulate, RATES, dtype=np.float32), left)
     later = left[..., None] * gait.rate[..., None] / rates  # (n, 4, rates) until the foot comes down
     apart = unison(xp, gait.phases)[..., None] + (rates - 1.0) * left[..., None] / gait.period[:, None, None]
     total = 0.1 * ((rates - 1) / config.modulate) ** 2 + (apart / _APART) ** 2
