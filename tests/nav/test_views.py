@@ -11,6 +11,7 @@ from vinl.nav.config import EpisodeConfig, RewardConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.robot_config import CameraConfig, ExecutionConfig, MotionConfig, ViewConfig
 from vinl.sensing.depth import DepthCamera
+from vinl.sensing.odometry import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig
 from vinl.world.mesh import floorplan_mesh
 from vinl.world.readers import load_floorplan
@@ -140,6 +141,29 @@ def test_an_image_is_as_old_and_the_camera_as_askew_as_drawn(config, homes):
     resting = NavEnvironment(settings, homes)
     for name in ("home", "goal", "position", "yaw", "gain", "mount", "sway"):
         assert torch.equal(resting.state[name], NavEnvironment(old.config, homes).state[name])
+
+
+def test_with_drift_the_robot_believes_otherwise_but_arrives_where_the_goal_is(config, homes):
+    settings = replace(
+        config, num_envs=200, camera=None, previous="action", episodes=EpisodeConfig(distance=(1.0, 6.0))
+    )
+    exact = NavEnvironment(settings, homes)
+    drifting = NavEnvironment(replace(settings, odometry=OdometryConfig((0.2, 0.2))), homes)
+    apart, arrived = torch.zeros(200), 0
+    for _ in range(40):
+        bearing = torch.atan2(exact.observe()[1][:, 2], exact.observe()[1][:, 1])
+        action = torch.stack([torch.where(bearing.abs() < 0.6, 1.0, -1.0), (bearing / 0.52).clamp(-1, 1)], 1)
+        steps = [environment.advance(action) for environment in (exact, drifting)]
+        for one, other in zip(*steps, strict=True):
+            assert torch.equal(one, other)  # reward, end and success follow from where the robot is
+        apart = torch.maximum(apart, (exact.observe()[1] - drifting.observe()[1])[:, 0].abs())
+        arrived += int((steps[0][1] & ~steps[0][2]).sum())
+        for environment in (exact, drifting):
+            environment.restart(steps[0][1])
+        torch.testing.assert_close(  # a new episode begins with the true place
+            exact.observe()[1][steps[0][1]], drifting.observe()[1][steps[0][1]], atol=1e-6, rtol=0
+        )
+    assert arrived > 20 and 0.1 < apart.max() < 1.0
 
 
 def test_reward_is_progress_and_the_goal_ends_the_episode(config, homes):

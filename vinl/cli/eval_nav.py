@@ -37,6 +37,9 @@ class Options:
     sensors: str = "ideal"
     """Errors of the depth camera: ideal (none), realistic (a stereo camera: noise, holes, delay, a mount that is a
     little off), or a YAML file like configs/sensors/realistic.yaml."""
+    drift: float = 0.0
+    """The robot knows where it is from its own motion alone, and measures distances too long or too short by this
+    fraction (0.02: 2 %); its heading drifts too, by up to 0.1 rad times this a metre. It arrives where the goal is."""
     clutter: float = 0.0
     """Share of the homes with blocks that the camera sees and the robot steps over."""
     min_distance: float = 5.0
@@ -90,6 +93,7 @@ def main(argv: list[str]) -> int:
         options.seed,
         options.motion,
         options.sensors,
+        options.drift,
         distance,
         options.steps,
         clutter=options.clutter,

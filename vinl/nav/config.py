@@ -10,6 +10,7 @@ from vinl.nav.limits import Range, check_number, check_range
 from vinl.nav.ppo_config import NetworkConfig, PpoConfig
 from vinl.nav.robot_config import CameraConfig, ExecutionConfig, MotionConfig, RobotConfig, ViewConfig
 from vinl.policies.card import PREVIOUS
+from vinl.sensing.odometry import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig
 from vinl.world.homes.config import HomeConfig
 
@@ -156,6 +157,8 @@ class NavConfig:
             same units, (-1, 0) where the step was cancelled, or ``both``.
         camera: null: the robot is blind.
         sensors: errors of the camera.
+        odometry: errors of where the robot believes to be: distance and bearing of the goal follow from that. An
+            episode ends, and is rewarded, by where it is.
     """
 
     num_envs: int = 4096
@@ -167,6 +170,7 @@ class NavConfig:
     robot: RobotConfig = field(default_factory=RobotConfig)
     camera: CameraConfig | None = field(default_factory=CameraConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)
+    odometry: OdometryConfig = field(default_factory=OdometryConfig)
     motion: MotionConfig = field(default_factory=MotionConfig)
     execution: ExecutionConfig = field(default_factory=ExecutionConfig)
     clutter: ClutterConfig = field(default_factory=ClutterConfig)

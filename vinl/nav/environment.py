@@ -21,6 +21,7 @@ from vinl.nav.view_kernels import aim_cameras, draw_keys, render_interior
 from vinl.nav.way_kernel import point_ways
 from vinl.robot.cameras import Camera
 from vinl.sensing.depth import check_device
+from vinl.sensing.odometry import Odometry
 from vinl.sensing.preparation import settle_missing
 from vinl.sensing.sensor import DepthSensor
 
@@ -99,6 +100,10 @@ class NavEnvironment:
         if self.camera is not None:
             self._sensor = DepthSensor(config.sensors, self.camera, n, self.device)
             self.state |= {f"camera_{name}": tensor for name, tensor in self._sensor.drawn.items()}
+        self._odometry: Odometry | None = None
+        if not config.odometry.is_exact:
+            self._odometry = Odometry(config.odometry, n, self.device)
+            self.state |= {f"odometry_{name}": tensor for name, tensor in self._odometry.state.items()}
         self._key = self._zeros(n, dtype=torch.int32)
         self._rows = torch.arange(n, dtype=torch.int32, device=self.device)
         self._chosen = self._zeros(n, dtype=torch.bool)
@@ -198,12 +203,14 @@ class NavEnvironment:
         state["action"].copy_(action.detach()).clamp_(-1.0, 1.0)
         state["chance"][1] += 1
         evicted = state["generation"] != self.homes.generations()[state["home"].long()]
-        before = state["distance"].clone()
+        before, place = state["distance"].clone(), state["position"].clone()
         self._launch(
             move_robots,
             self.num_envs,
             [self.homes.homes, self._rules, "chance", "action", self._robots, "moved", "blocked", "straight"],
         )
+        if self._odometry is not None:
+            self._odometry.advance(place, state["position"])
         state["steps"] += 1
         state["path"] += self._moved
         state["collisions"] += self._blocked
@@ -278,6 +285,8 @@ class NavEnvironment:
         if len(lost):
             raise InputError(f"robot {int(lost[0])} cannot reach its goal from where it was placed")
         self.state["start_distance"].copy_(self.state["distance"])
+        self._chosen.fill_(True)
+        self._draw_errors()
         self._observation = None
 
     def stagger(self) -> None:
@@ -302,19 +311,32 @@ class NavEnvironment:
             self.num_envs,
             [self.homes.homes, self._rules, "chance", "chosen", self._robots, "unplaced"],
         )
-        if self._sensor is not None and not self._sensor.config.is_ideal:
-            self._launch(draw_keys, self.num_envs, ["chance", _DRAWN_AT_START, "key"])
-            self._sensor.restart(self._key, self._chosen)
+        self._draw_errors()
         for name in ("steps", "path", "collisions", "in_a_row"):
             state[name].masked_fill_(chosen, 0.0)
         state["action"].masked_fill_(chosen[:, None], 0.0)
         state["start_distance"].copy_(torch.where(chosen, state["distance"], state["start_distance"]))
         self._observation = None
 
+    def _draw_errors(self) -> None:
+        """Of camera and odometry, of the robots whose episodes start."""
+        sensor = None if self._sensor is None or self._sensor.config.is_ideal else self._sensor
+        if sensor is None and self._odometry is None:
+            return
+        self._launch(draw_keys, self.num_envs, ["chance", _DRAWN_AT_START, "key"])
+        if sensor is not None:
+            sensor.restart(self._key, self._chosen)
+        if self._odometry is not None:
+            self._odometry.restart(self._key, self._chosen, self.state["position"])
+
     def _look(self) -> tuple[Tensor, Tensor]:
         n, state = self.num_envs, self.state
-        to_goal = self.goals() - state["position"]
-        bearing = torch.atan2(to_goal[:, 1], to_goal[:, 0]) - state["yaw"]
+        place, yaw = state["position"], state["yaw"]
+        if self._odometry is not None:
+            believed = self._odometry.state["estimate"]
+            place, yaw = believed[:, :2], yaw + believed[:, 2]
+        to_goal = self.goals() - place
+        bearing = torch.atan2(to_goal[:, 1], to_goal[:, 0]) - yaw
         distance = torch.linalg.vector_norm(to_goal, dim=1) / DISTANCE_UNIT
         last = [state["previous"]]
         if self.config.previous == "both":

@@ -18,6 +18,7 @@ from vinl.policies.card import PolicyCard, find_previous
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.policies.velocity_range import VelocityRange
+from vinl.sensing.odometry import OdometryConfig
 from vinl.sensing.sensor_config import load_sensors
 from vinl.world.readers import expand_paths, shipped_floorplans
 
@@ -44,6 +45,7 @@ class NavEvaluation:
         seed: of starts, goals, headings and the camera's motion.
         motion: a key of ``MOTIONS``.
         sensors: errors of the camera: ``ideal``, ``realistic``, ``training``, or a YAML file, see ``load_sensors``.
+        drift: relative error of the distances that the robot measures on its way, see ``OdometryConfig``.
         distance: range of the geodesic distance at the start [m].
         steps: an episode ends after so many decisions of 0.5 s [paper code: 250].
         goals: in each home.
@@ -56,6 +58,7 @@ class NavEvaluation:
     seed: int = 0
     motion: str = "walking"
     sensors: str = "ideal"
+    drift: float = 0.0
     distance: tuple[float, float] = (5.0, 30.0)
     steps: int = 250
     goals: int = 8
@@ -71,6 +74,8 @@ class NavEvaluation:
             raise InputError(f"--motion must be one of {', '.join(MOTIONS)}, got {self.motion!r}")
         if not 0 <= self.clutter <= 1:
             raise InputError(f"--clutter must lie between 0 and 1, got {self.clutter:g}")
+        if not 0 <= self.drift <= 0.5:
+            raise InputError(f"--drift must lie between 0 and 0.5, got {self.drift:g}")
         if self.steps < 1:
             raise InputError(f"--steps must be at least 1, got {self.steps}")
 
@@ -152,6 +157,7 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
         previous="action" if card is None else find_previous(card),
         camera=camera,
         sensors=load_sensors(rules.sensors),
+        odometry=OdometryConfig((rules.drift, rules.drift)),
         episodes=episodes,
         homes=homes,
         clutter=replace(config.clutter, share=rules.clutter),

@@ -157,3 +157,11 @@ def spoil_depth(
     if gone:
         value = lost
     spoilt[image, row, column] = spoilt.dtype(value)
+
+
+@wp.kernel
+@no_type_check
+def draw_uniform(key: wp.array(dtype=wp.int32), drawn: wp.array(dtype=wp.float32, ndim=2)):
+    """Numbers in [0, 1) for each robot that follow from its key alone."""
+    n, k = wp.tid()
+    drawn[n, k] = wp.randf(wp.rand_init(key[n], 1 + k))
