@@ -1,4 +1,4 @@
-"""Draw the pictures of ``docs/robot.md`` and ``docs/sensing.md``: the robot, and what its cameras see in a home.
+"""Draw the pictures of ``docs/robot.md``: the robot, and what its cameras see in a home.
 
 Run ``python scripts/make_pictures.py``; the same seed gives the same pictures.
 """

@@ -1,4 +1,4 @@
-"""A legged robot crosses homes it has never seen and steps over their clutter, seeing only through depth cameras.
+"""A legged robot crosses cluttered homes it has never seen, from depth images: training and evaluation on MuJoCo.
 
 The names below are the public ones; each part is imported when its first name is used.
 """

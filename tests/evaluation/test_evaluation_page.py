@@ -1,4 +1,4 @@
-"""The navigator on docs/evaluation.md walks."""
+"""The navigator on docs/howto_own_policy.md walks."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ from vinl.evaluation.config import EvaluationConfig
 from vinl.evaluation.evaluate import evaluate
 from vinl.world.floorplan import FloorPlan
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "evaluation.md").read_text()
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "howto_own_policy.md").read_text()
 
 
 def test_navigator_on_the_page(two_rooms: FloorPlan) -> None:

@@ -86,7 +86,7 @@ def _help() -> str:
     rows = "\n".join(f"  {name:<12}{summary}" for name, (_, summary) in COMMANDS.items())
     return f"""usage: vinl COMMAND [OPTIONS]
 
-A legged robot crosses homes it has never seen and steps over their clutter, seeing only through depth cameras.
+A legged robot crosses cluttered homes it has never seen, from depth images: training and evaluation on MuJoCo.
 
 commands:
 {rows}
