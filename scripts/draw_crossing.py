@@ -1,8 +1,8 @@
 """Film the best of many crossings of one block, and draw the height of the feet in all of them, for the docs.
 
-    python scripts/draw_crossing.py docs/images/crossing teacher [--height 0.12] [--speed 0.6] [--crossings 32]
+    python scripts/draw_crossing.py out/crossing teacher [--height 0.12] [--speed 0.6] [--crossings 32]
 
-writes ``docs/images/crossing.gif`` and ``docs/images/crossing.png`` and prints how many crossings touched nothing. The
+writes ``out/crossing.gif`` and ``out/crossing.png`` and prints how many crossings touched nothing. The
 best is the one with the fewest control steps of feet and legs on the block; its line in the picture is the strong one.
 """
 

@@ -1,6 +1,6 @@
 """Draw where robots walk on the block course, from above: over the blocks or around them.
 
-    python scripts/draw_ways.py docs/images/ways.png rough teacher [--robots 24] [--seconds 20]
+    python scripts/draw_ways.py docs/research/images/ways.png rough teacher [--robots 24] [--seconds 20]
 
 One panel for each policy; all have the same starts and commands. Needs nothing of the ``train`` extra.
 """
