@@ -13,8 +13,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from vinl.evaluation.step import Crossing, cross_block, describe_steps, draw_steps
-from vinl.evaluation.step_film import film_steps
+from vinl.courses.crossing import Crossing, cross_block, describe_steps, draw_steps
+from vinl.courses.crossing_film import film_steps
 from vinl.policies.io import load_policy
 
 

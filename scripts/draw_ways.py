@@ -17,12 +17,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from vinl.evaluation.courses import Course, command_ranges
-from vinl.evaluation.crew import one_thread
-from vinl.evaluation.grounds import Ground, GroundConfig, build_ground
-from vinl.evaluation.herd import BoxHerd
-from vinl.evaluation.robot_records import aggregate_robots
-from vinl.evaluation.trial import run_trial
+from vinl.chain.workers import one_thread
+from vinl.courses.courses import Course, command_ranges
+from vinl.courses.grounds import Ground, GroundConfig, build_ground
+from vinl.courses.herd import BoxHerd
+from vinl.courses.robot_records import aggregate_robots
+from vinl.courses.trial import run_trial
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT

@@ -15,13 +15,13 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 import vinl
-from vinl.evaluation.panels import colour_depth
-from vinl.evaluation.video import POSE_DT
+from vinl.render.chase_camera import ChaseCamera
+from vinl.render.panels import colour_depth
+from vinl.render.raytrace import RayRenderer
+from vinl.render.robot_shape import RobotShape
+from vinl.render.scene import plan_scene
+from vinl.render.video import POSE_DT
 from vinl.robot.rotation import yaw_of
-from vinl.sensing.chase import ChaseCamera
-from vinl.sensing.raytrace import RayRenderer
-from vinl.sensing.robot_shape import RobotShape
-from vinl.sensing.scene import plan_scene
 
 SIZE, INSET = (600, 360), (144, 81)
 """Width and height of the picture and of what the locomotion camera sees [pixels]."""

@@ -12,13 +12,13 @@ import imageio.v3 as iio
 import matplotlib as mpl
 import numpy as np
 
+from vinl.render.chase_camera import ChaseCamera
+from vinl.render.raytrace import RayRenderer, look_at
+from vinl.render.robot_shape import RobotShape
+from vinl.render.scene import BLOCK, plain_scene, plan_scene
 from vinl.robot.aliengo import home_qpos
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
-from vinl.sensing.chase import ChaseCamera
 from vinl.sensing.depth import DepthCamera
-from vinl.sensing.raytrace import RayRenderer, look_at
-from vinl.sensing.robot_shape import RobotShape
-from vinl.sensing.scene import BLOCK, plain_scene, plan_scene
 from vinl.world.boxes import Boxes
 from vinl.world.clutter import CLUTTER, scatter_blocks
 from vinl.world.grid import GridFrame

@@ -15,10 +15,10 @@ from jaxtyping import Float
 from rich.console import Console
 from rich.table import Table
 
-from vinl.evaluation.crew import one_thread
-from vinl.evaluation.grounds import GroundConfig, build_ground
-from vinl.evaluation.trial import sense_ground
-from vinl.evaluation.walker import Walker, joint_targets
+from vinl.chain.robot import Walker, joint_targets
+from vinl.chain.workers import one_thread
+from vinl.courses.grounds import GroundConfig, build_ground
+from vinl.courses.trial import sense_ground
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, FOOT_RADIUS

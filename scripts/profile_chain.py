@@ -19,17 +19,17 @@ from typing import Any
 import numpy as np
 import tyro
 
+from vinl.benchmark.work import LARGEST
+from vinl.chain.batching import BatchedPolicy, ask_only
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.depth_cameras import Eyes
+from vinl.chain.episode import draw_routes, draw_setup
+from vinl.chain.navigators.oracle import OracleNavigator
+from vinl.chain.recorder import Tally
+from vinl.chain.robot import Walker
+from vinl.chain.rollout import run_episodes
+from vinl.chain.workers import one_thread
 from vinl.config.loader import load_config
-from vinl.evaluation.batches import BatchedPolicy, ask_only
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.crew import one_thread
-from vinl.evaluation.episodes import draw_routes, draw_setup
-from vinl.evaluation.eyes import Eyes
-from vinl.evaluation.oracle import OracleNavigator
-from vinl.evaluation.rollout import run_episodes
-from vinl.evaluation.tally import Tally
-from vinl.evaluation.walker import Walker
-from vinl.evaluation.work import LARGEST
 from vinl.loco.config import LocoConfig
 from vinl.nav.config import NavConfig
 from vinl.policies.card import locomotion_card, navigation_card

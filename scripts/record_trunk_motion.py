@@ -14,8 +14,8 @@ import os
 from dataclasses import asdict
 from pathlib import Path
 
-from vinl.evaluation.motion_fit import Execution, Sway, describe_sway, fit_execution
-from vinl.evaluation.trunk_motion import record_motion
+from vinl.courses.motion_fit import Execution, Sway, describe_sway, fit_execution
+from vinl.courses.trunk_motion import record_motion
 from vinl.policies.io import load_policy
 from vinl.world.clutter import CLUTTER
 

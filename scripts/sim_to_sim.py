@@ -22,14 +22,14 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from vinl.evaluation.courses import COMMANDS, Course, Start, choose_commands, command_ranges
-from vinl.evaluation.crew import one_thread
-from vinl.evaluation.grounds import Ground, GroundConfig, build_ground
-from vinl.evaluation.herd import MAX_TILT, BoxHerd, Herd
-from vinl.evaluation.robot_records import RobotRecord, aggregate_robots
-from vinl.evaluation.senses import check_senses
-from vinl.evaluation.touches import BlockTouches
-from vinl.evaluation.trial import run_trial
+from vinl.chain.choose import check_senses
+from vinl.chain.workers import one_thread
+from vinl.courses.block_contacts import BlockTouches
+from vinl.courses.courses import COMMANDS, Course, Start, choose_commands, command_ranges
+from vinl.courses.grounds import Ground, GroundConfig, build_ground
+from vinl.courses.herd import MAX_TILT, BoxHerd, Herd
+from vinl.courses.robot_records import RobotRecord, aggregate_robots
+from vinl.courses.trial import run_trial
 from vinl.loco.simulation import Body, Simulation
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy

@@ -18,10 +18,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import distance_transform_edt
 
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.episodes import EpisodeSetup, draw_routes, draw_setup
-from vinl.evaluation.navigator import Task
-from vinl.evaluation.rollout import run_episodes
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.episode import EpisodeSetup, draw_routes, draw_setup
+from vinl.chain.navigators.base import Task
+from vinl.chain.rollout import run_episodes
 from vinl.policies.io import load_policy
 from vinl.robot.cameras import Camera
 from vinl.world.clutter import CLUTTER

@@ -46,6 +46,8 @@ _checker.check = beartype(conf=BeartypeConf(is_pep484_tower=True))  # type: igno
 sys.modules["vinl_type_checker"] = _checker
 install_import_hook(_checked_modules(), "vinl_type_checker.check")  # before the first import of vinl in this process
 
+pytest_plugins = ["small_home"]
+
 hypothesis.settings.register_profile(
     "quick", max_examples=25, derandomize=True, deadline=None, database=None, print_blob=False
 )

@@ -1,14 +1,22 @@
-"""A small home and a policy that stands still, for all tests of the evaluation."""
+"""A small home, policies that hardly walk and the record of an episode, for all tests of the chain; a pytest plugin."""
 
 import numpy as np
 import pytest
 import torch
 
+from vinl.chain.records import EpisodeRecord
 from vinl.policies.card import locomotion_card
 from vinl.policies.networks import MapActor
 from vinl.policies.policy import LocomotionPolicy
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import FloorPlan, assemble_floorplan, frame_around
+
+RECORD = EpisodeRecord(
+    plan="home", episode=0, seed=0, start=(0.0, 0.0), goal=(5.0, 0.0), yaw=0.0, straight_m=5.0, geodesic_m=6.0,
+    blocks=3, success=True, end_reason="success", fell=False, time_s=10.0, distance_m=8.0, spl=0.75, soft_spl=0.75,
+    foot_steps=16, foot_block_steps=12, foot_wall_steps=8, leg_contact_steps=4, trunk_contact_steps=0,
+    paper_foot_steps=24, speed_rmse=0.1, yaw_rate_rmse=0.2,
+)  # fmt: skip
 
 
 @pytest.fixture(scope="session")

@@ -10,10 +10,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from vinl.benchmark.evaluate import evaluate as evaluate
+    from vinl.chain.config import EvaluationConfig as EvaluationConfig
     from vinl.config.errors import InputError as InputError
     from vinl.config.loader import load_config as load_config
-    from vinl.evaluation.config import EvaluationConfig as EvaluationConfig
-    from vinl.evaluation.evaluate import evaluate as evaluate
     from vinl.notebook.film import Film as Film
     from vinl.notebook.film import show_video as show_video
     from vinl.notebook.own import as_locomotor as as_locomotor
@@ -43,7 +43,7 @@ _WHERE = {
     "Blocks": "vinl.world.blocks",
     "Boxes": "vinl.world.boxes",
     "Camera": "vinl.robot.cameras",
-    "EvaluationConfig": "vinl.evaluation.config",
+    "EvaluationConfig": "vinl.chain.config",
     "Film": "vinl.notebook.film",
     "FloorPlan": "vinl.world.floorplan",
     "InputError": "vinl.config.errors",
@@ -55,7 +55,7 @@ _WHERE = {
     "as_locomotor": "vinl.notebook.own",
     "as_navigator": "vinl.notebook.own",
     "draw_plan": "vinl.notebook.plans",
-    "evaluate": "vinl.evaluation.evaluate",
+    "evaluate": "vinl.benchmark.evaluate",
     "generate_home": "vinl.world.homes",
     "list_policies": "vinl.policies.io",
     "load_config": "vinl.config.loader",

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import torch
 import yaml
-from sighted import TinyGuide, TinyWalker
+from tiny_networks import TinyGuide, TinyWalker
 
+from vinl.benchmark.evaluate import evaluate
+from vinl.benchmark.routes import place_route, read_routes
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.cli.app import main
 from vinl.config.errors import InputError
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.evaluate import evaluate
-from vinl.evaluation.learned_navigator import LearnedNavigator
-from vinl.evaluation.routes import place_route, read_routes
 from vinl.policies.card import locomotion_card, navigation_card
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.policy import LocomotionPolicy

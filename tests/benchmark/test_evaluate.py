@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.evaluate import evaluate
-from vinl.evaluation.records import Results
-from vinl.evaluation.report import render_report
-from vinl.evaluation.results_file import check_out, results_as_dict, strip_command, write_json
+from vinl.benchmark.evaluate import evaluate
+from vinl.benchmark.report import render_report
+from vinl.benchmark.results_file import results_as_dict
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.records import Results
+from vinl.config.output import check_out, strip_command, write_json
 from vinl.policies.policy import LocomotionPolicy
 from vinl.world.floorplan import FloorPlan
 

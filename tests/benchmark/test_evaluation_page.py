@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.evaluate import evaluate
+from vinl.benchmark.evaluate import evaluate
+from vinl.chain.config import EvaluationConfig
 from vinl.world.floorplan import FloorPlan
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "howto_own_policy.md").read_text()

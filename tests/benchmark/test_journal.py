@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vinl.benchmark.evaluate import evaluate_rows
+from vinl.benchmark.journal import Journal, describe_differences, read_about, read_episodes, read_plans
+from vinl.benchmark.protocol import Protocol
+from vinl.benchmark.work import Row
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.navigators.choose import load_navigator
+from vinl.chain.records import Results
 from vinl.config.errors import InputError
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.evaluate import evaluate_rows
-from vinl.evaluation.journal import Journal, describe_differences, read_about, read_episodes, read_plans
-from vinl.evaluation.navigator import load_navigator
-from vinl.evaluation.protocol import Protocol
-from vinl.evaluation.records import Results
-from vinl.evaluation.work import Row
 from vinl.policies.policy import LocomotionPolicy
 from vinl.world.floorplan import FloorPlan
 

@@ -5,23 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_home import RECORD
 
-from vinl.evaluation.metrics import (
-    aggregate_episodes,
-    bootstrap_interval,
-    summarise,
-    weigh_path,
-    weigh_progress,
-    wilson_interval,
-)
-from vinl.evaluation.records import EpisodeRecord
-
-RECORD = EpisodeRecord(
-    plan="home", episode=0, seed=0, start=(0.0, 0.0), goal=(5.0, 0.0), yaw=0.0, straight_m=5.0, geodesic_m=6.0,
-    blocks=3, success=True, end_reason="success", fell=False, time_s=10.0, distance_m=8.0, spl=0.75, soft_spl=0.75,
-    foot_steps=16, foot_block_steps=12, foot_wall_steps=8, leg_contact_steps=4, trunk_contact_steps=0,
-    paper_foot_steps=24, speed_rmse=0.1, yaw_rate_rmse=0.2,
-)  # fmt: skip
+from vinl.benchmark.metrics import aggregate_episodes
+from vinl.chain.metrics import bootstrap_interval, summarise, weigh_path, weigh_progress, wilson_interval
 
 
 def test_spl() -> None:

@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 import pytest
-from test_metrics import RECORD
+from small_home import RECORD
 
-from vinl.evaluation.paired import compare_rows, difference, mcnemar_p
+from vinl.benchmark.paired import compare_rows, difference, mcnemar_p
 
 
 def make(outcomes: str, steps: int = 0) -> list:

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from vinl.benchmark.table_config import TableConfig
 from vinl.cli.app import main
 from vinl.config.loader import load_config
-from vinl.evaluation.table_config import TableConfig
 from vinl.policies.io import save_policy
 from vinl.policies.policy import LocomotionPolicy
 

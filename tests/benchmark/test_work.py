@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vinl.evaluation import work
-from vinl.evaluation.oracle import OracleNavigator
-from vinl.evaluation.work import Row, cut_jobs, list_keys, longest_first, split_evenly
+from vinl.benchmark import work
+from vinl.benchmark.work import Row, cut_jobs, list_keys, longest_first, split_evenly
+from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.policies.io import load_policy
 from vinl.world.floorplan import FloorPlan
 from vinl.world.start_goal import StartGoal

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from vinl.evaluation import work
-from vinl.evaluation.batches import BatchedPolicy, batch_policy, is_steady
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.evaluate import evaluate
-from vinl.evaluation.learned_navigator import LearnedNavigator
+from vinl.benchmark import work
+from vinl.benchmark.evaluate import evaluate
+from vinl.chain.batching import BatchedPolicy, batch_policy, is_steady
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.policies.card import locomotion_card, navigation_card
 from vinl.policies.depth_actor import DepthActor
 from vinl.policies.depth_policy import DepthPolicy

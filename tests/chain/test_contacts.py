@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from vinl.evaluation.contact import KINDS, ContactReader
-from vinl.evaluation.scene import build_scene
-from vinl.evaluation.walker import Walker
+from vinl.chain.contacts import KINDS, ContactReader
+from vinl.chain.robot import Walker
+from vinl.chain.scene import build_scene
 from vinl.robot.aliengo import DEFAULT_POSE
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vinl.evaluation.eyes import Eyes, open_eyes
+from vinl.chain.depth_cameras import Eyes, open_eyes
 from vinl.robot.aliengo import home_qpos
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
 from vinl.robot.rotation import matrix_of

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_metrics import RECORD
+from small_home import RECORD
 
-from vinl.evaluation.blame import FAILURES, count_failures, find_cause, measure_distance, read_failure
-from vinl.evaluation.contact import KINDS
+from vinl.chain.contacts import KINDS
+from vinl.chain.failures import FAILURES, count_failures, find_cause, measure_distance, read_failure
 from vinl.world.blocks import Blocks
 from vinl.world.endings import END_REASONS, name_late_end
 from vinl.world.floorplan import FloorPlan

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vinl.evaluation.ground_scan import GroundScan
+from vinl.chain.ground_map import GroundScan
 from vinl.robot.aliengo import home_qpos
 from vinl.robot.observation import SCAN_POINTS
 from vinl.sensing.detour import DetourConfig

@@ -7,15 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from sighted import TinyGuide, TinyWalker
+from tiny_networks import TinyGuide, TinyWalker
 
+from vinl.benchmark.evaluate import evaluate
+from vinl.chain.batching import find_safe_sizes
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.navigators.base import Task
+from vinl.chain.navigators.choose import load_navigator
+from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.cli.app import main
 from vinl.config.errors import InputError
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.evaluate import evaluate
-from vinl.evaluation.learned_navigator import LearnedNavigator
-from vinl.evaluation.navigator import Task, load_navigator
-from vinl.evaluation.safe_sizes import find_safe_sizes
 from vinl.policies.card import locomotion_card, navigation_card
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy, save_policy

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.episodes import draw_routes
-from vinl.evaluation.navigator import Task, load_navigator
-from vinl.evaluation.oracle import OracleNavigator
-from vinl.evaluation.rollout import goal_in_heading_frame
-from vinl.evaluation.way import plan_way
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.episode import draw_routes
+from vinl.chain.navigators.base import Task
+from vinl.chain.navigators.choose import load_navigator
+from vinl.chain.navigators.oracle import OracleNavigator
+from vinl.chain.navigators.path import plan_way
+from vinl.chain.rollout import goal_in_heading_frame
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import FloorPlan
 from vinl.world.free_space import FreeSpace

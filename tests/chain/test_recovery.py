@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vinl.evaluation.recovery import Recovery
+from vinl.chain.navigators.recovery import Recovery
 
 RATE, SPEED = 1.0, 0.5
 

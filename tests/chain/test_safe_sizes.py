@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from vinl.evaluation.safe_sizes import BATCH, CANDIDATES, find_safe_sizes, split_calls
+from vinl.chain.batching import BATCH, CANDIDATES, find_safe_sizes, split_calls
 from vinl.policies.io import load_policy
 from vinl.policies.networks import PolicyNetwork
 

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 import trimesh
 
-from vinl.evaluation.stuck_places import AHEAD, LASTS, RADIUS, StuckPlaces
+from vinl.chain.navigators.recovery import AHEAD, LASTS, RADIUS, StuckPlaces
 from vinl.robot.cameras import NAVIGATION_CAMERA
 from vinl.sensing.depth import DepthCamera
 

@@ -6,7 +6,7 @@ import multiprocessing
 import threading
 import time
 
-from vinl.evaluation.crew import Context, Crew
+from vinl.chain.workers import Context, Crew
 
 
 def tell_size(context: Context, job: int) -> int:

@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 from rich.progress import Task
 
-from vinl.evaluation.progress import Progress, TimeLeft
+from vinl.cli.progress import Progress, TimeLeft
 
 
 def make_task(done: int, before: int, elapsed: float) -> Task:

@@ -7,8 +7,7 @@ import imageio.v2 as imageio
 import numpy as np
 import pytest
 
-from vinl.evaluation import step_film
-from vinl.evaluation.step import Crossing, cross_block, draw_steps
+from vinl.courses.crossing import Crossing, cross_block, draw_steps
 from vinl.policies.io import load_policy
 from vinl.policies.policy import LocomotionPolicy
 
@@ -28,20 +27,20 @@ def test_rough_comes_across_and_is_seen_to_touch(crossing: Crossing) -> None:
 
 
 def test_a_fall_or_standing_still_is_not_across(standing: LocomotionPolicy, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vinl.evaluation.step._PATIENCE", 0.1)
+    monkeypatch.setattr("vinl.courses.crossing._PATIENCE", 0.1)
     crossing = cross_block(standing, crossings=1)[0]
     assert not crossing.done and len(crossing.qpos) == len(crossing.foot_touches) > 10
 
 
 @pytest.mark.parametrize("name", ["step.mp4", "step.gif"])
 def test_pictures_are_written(name: str, crossing: Crossing, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(step_film, "SIZE", (64, 32))
+    monkeypatch.setattr(crossing_film, "SIZE", (64, 32))
     few = replace(
         crossing, **{k: getattr(crossing, k)[-150::12] for k in ("qpos", "feet", "foot_touches", "leg_touches")}
     )
     ways = {"a": [few], "b": [few]}
     draw_steps(ways, 0.1, Path("out/step.png"))
-    step_film.film_steps(ways, 0.1, Path("out") / name)
+    crossing_film.film_steps(ways, 0.1, Path("out") / name)
     assert sorted(p.name for p in Path("out").iterdir()) == sorted([name, "step.png"])
     with imageio.get_reader(Path("out") / name) as film:
         assert film.get_data(0).shape[:2] == (64, 64)

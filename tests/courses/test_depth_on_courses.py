@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from vinl.evaluation.eyes import Eyes
-from vinl.evaluation.grounds import GroundConfig, build_ground
-from vinl.evaluation.locomotor import compare_locomotors
+from vinl.chain.depth_cameras import Eyes
+from vinl.courses.evaluate import compare_locomotors
+from vinl.courses.grounds import GroundConfig, build_ground
 from vinl.policies.card import PolicyCard
 from vinl.policies.depth_actor import DepthActor
 from vinl.policies.depth_policy import DepthPolicy

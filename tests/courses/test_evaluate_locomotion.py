@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from vinl.evaluation.courses import COMMANDS, FIXED, Course, Start, choose_commands, command_ranges, draw_commands
-from vinl.evaluation.grounds import GroundConfig, build_ground
-from vinl.evaluation.herd import BoxHerd
-from vinl.evaluation.locomotor import compare_locomotors, evaluate_locomotor
-from vinl.evaluation.robot_records import RobotRecord, aggregate_robots
-from vinl.evaluation.scene import build_scene
-from vinl.evaluation.touches import BINS
+from vinl.chain.scene import build_scene
+from vinl.courses.block_contacts import BINS
+from vinl.courses.courses import COMMANDS, FIXED, Course, Start, choose_commands, command_ranges, draw_commands
+from vinl.courses.evaluate import compare_locomotors, evaluate_locomotor
+from vinl.courses.grounds import GroundConfig, build_ground
+from vinl.courses.herd import BoxHerd
+from vinl.courses.robot_records import RobotRecord, aggregate_robots
 from vinl.policies.policy import LocomotionPolicy
 from vinl.robot.aliengo import DEFAULT_POSE
 from vinl.world.blocks import Blocks

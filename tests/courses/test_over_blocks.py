@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vinl.evaluation.grounds import GroundConfig, build_ground
-from vinl.evaluation.robot_records import RobotRecord, aggregate_robots
-from vinl.evaluation.step import Crossing, describe_steps
+from vinl.courses.crossing import Crossing, describe_steps
+from vinl.courses.grounds import GroundConfig, build_ground
+from vinl.courses.robot_records import RobotRecord, aggregate_robots
 
 
 def test_ground_knows_where_its_blocks_lie():

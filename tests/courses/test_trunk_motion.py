@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from vinl.config.errors import InputError
-from vinl.evaluation.motion_fit import STEP, describe_sway, fit_execution, lag_commands, read_twists
-from vinl.evaluation.trunk_motion import MotionRecord, draw_commands, record_motion
+from vinl.courses.motion_fit import STEP, describe_sway, fit_execution, lag_commands, read_twists
+from vinl.courses.trunk_motion import MotionRecord, draw_commands, record_motion
 from vinl.policies.policy import LocomotionPolicy
 
 

@@ -13,13 +13,13 @@ from gymnasium.utils.env_checker import check_env
 
 import vinl
 import vinl.gym
+from vinl.chain.batching import batch_policy
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.controller import Senses
+from vinl.chain.navigators.oracle import OracleNavigator
+from vinl.chain.records import plain_record
 from vinl.config.errors import InputError
 from vinl.config.loader import load_config
-from vinl.evaluation.batches import batch_policy
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.oracle import OracleNavigator
-from vinl.evaluation.records import plain_record
-from vinl.evaluation.senses import Senses
 from vinl.gym.actions import JOINT_REACH
 from vinl.gym.home import RANGE, HomeEnv
 from vinl.nav.config import NavConfig

@@ -12,11 +12,11 @@ from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.config.paths import assets_dir
-from vinl.evaluation.nav_report import aggregate_by_distance, choose_drawn
 from vinl.nav.config import NavConfig
 from vinl.nav.evaluation import END_REASONS, NavRecord, evaluate_kind
 from vinl.nav.evaluation_setup import NavEvaluation, build_homes, describe_episodes, load_navigator, name_kind
 from vinl.nav.home_store import HomeStore
+from vinl.nav.report import aggregate_by_distance, choose_drawn
 from vinl.nav.training import make_card
 from vinl.nav.warm_start import build_actor
 from vinl.policies.io import save_policy

@@ -37,7 +37,7 @@ def test_arrows_hold(copy: Path):
         ("world/planted.py", "import vinl.robot.aliengo", "arrows point one way"),
         ("sensing/planted.py", "import vinl.policies.card", "arrows point one way"),
         ("world/planted.py", "import torch", "the world knows no simulator"),
-        ("evaluation/planted.py", "import jax", "evaluating needs no training library"),
+        ("chain/planted.py", "import jax", "evaluating needs no training library"),
     ],
 )
 def test_planted_import_is_caught(module: str, line: str, contract: str, copy: Path):

@@ -8,8 +8,8 @@ import pytest
 import torch
 from torch import Tensor, nn
 
+from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.config.errors import InputError
-from vinl.evaluation.learned_navigator import LearnedNavigator
 from vinl.policies.card import PolicyCard, locomotion_card, navigation_card
 from vinl.policies.depth_actor import DepthActor
 from vinl.policies.depth_policy import DepthPolicy

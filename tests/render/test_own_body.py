@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from vinl.render.robot_shape import RobotShape
 from vinl.robot.aliengo import home_qpos
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
 from vinl.sensing.depth import DepthCamera
-from vinl.sensing.robot_shape import RobotShape
 from vinl.world.mesh import join_meshes
 
 POSES, SPREAD = 40, 0.6

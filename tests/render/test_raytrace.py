@@ -4,11 +4,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from vinl.render.chase_camera import ChaseCamera
+from vinl.render.raytrace import RayRenderer, look_at
+from vinl.render.robot_shape import RobotShape
+from vinl.render.scene import BLOCK, GOAL, plain_scene, plan_scene
 from vinl.robot.aliengo import home_qpos
-from vinl.sensing.chase import ChaseCamera
-from vinl.sensing.raytrace import RayRenderer, look_at
-from vinl.sensing.robot_shape import RobotShape
-from vinl.sensing.scene import BLOCK, GOAL, plain_scene, plan_scene
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame

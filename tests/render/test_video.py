@@ -5,8 +5,8 @@ from pathlib import Path
 import imageio.v2 as imageio
 import pytest
 
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.evaluate import evaluate
+from vinl.benchmark.evaluate import evaluate
+from vinl.chain.config import EvaluationConfig
 from vinl.policies.policy import LocomotionPolicy
 from vinl.world.floorplan import FloorPlan
 

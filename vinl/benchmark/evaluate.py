@@ -7,22 +7,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from vinl.benchmark.protocol import Films, Protocol
+from vinl.benchmark.store import Store
+from vinl.benchmark.work import Row, Shared, cut_jobs, film_job, list_keys, longest_first, missing_films, run_job
+from vinl.chain.choose import check_cameras, check_senses
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.navigators.base import ORACLE, Navigator
+from vinl.chain.navigators.choose import load_navigator
+from vinl.chain.records import Episode, Results
+from vinl.chain.workers import Crew
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.crew import Crew
-from vinl.evaluation.describe import describe_policy as describe_policy
-from vinl.evaluation.filming import film_job, missing_films
-from vinl.evaluation.navigator import ORACLE, Navigator, load_navigator
-from vinl.evaluation.protocol import Films, Protocol
-from vinl.evaluation.records import Episode, Results
-from vinl.evaluation.senses import check_cameras
-from vinl.evaluation.senses import check_senses as check_senses
-from vinl.evaluation.store import Store
-from vinl.evaluation.video import FilmJob
-from vinl.evaluation.work import Row, Shared, cut_jobs, list_keys, longest_first, run_job
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
+from vinl.render.video import FilmJob
 from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan
 

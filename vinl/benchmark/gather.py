@@ -7,13 +7,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from vinl.benchmark.merge import TABLE_FILE, Part, group_parts, merge_parts, read_part
+from vinl.benchmark.outputs import check_folder, read_table
+from vinl.benchmark.table import TableRow
+from vinl.chain.records import Results
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.evaluation.filming import name_film
-from vinl.evaluation.merge import TABLE_FILE, Part, group_parts, merge_parts, read_part
-from vinl.evaluation.outputs import check_folder, read_table
-from vinl.evaluation.records import Results
-from vinl.evaluation.table import TableRow
+from vinl.render.video import name_film
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from vinl.chain.records import Episode, EpisodeRecord, EpisodeTrace
 from vinl.config.errors import InputError
-from vinl.evaluation.records import Episode, EpisodeRecord, EpisodeTrace
-from vinl.evaluation.results_file import write_json
+from vinl.config.output import write_json
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers import load_floorplan
 from vinl.world.writer import write_floorplan

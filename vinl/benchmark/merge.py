@@ -8,10 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vinl.config.errors import InputError
-from vinl.config.loader import build_config
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.journal import (
+from vinl.benchmark.journal import (
     RUN_FILE,
     describe_differences,
     read_about,
@@ -19,10 +16,13 @@ from vinl.evaluation.journal import (
     read_plans,
     read_wall_seconds,
 )
-from vinl.evaluation.metrics import aggregate_episodes
-from vinl.evaluation.records import Episode, Key, Results
-from vinl.evaluation.shard import Shard
-from vinl.evaluation.work import list_keys
+from vinl.benchmark.metrics import aggregate_episodes
+from vinl.benchmark.shard import Shard
+from vinl.benchmark.work import list_keys
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.records import Episode, Key, Results
+from vinl.config.errors import InputError
+from vinl.config.loader import build_config
 
 TABLE_FILE = "table.json"
 

@@ -9,17 +9,18 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from vinl.benchmark.journal import RUN_FILE
+from vinl.benchmark.merge import TABLE_FILE
+from vinl.benchmark.report import write_report
+from vinl.benchmark.results_file import results_as_dict
+from vinl.benchmark.shard import Shard
+from vinl.benchmark.table import TableRow, summarise_table
+from vinl.benchmark.table_config import PaperFigures, RowConfig, TableConfig
+from vinl.benchmark.table_report import write_table_report
+from vinl.chain.records import Results
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
-from vinl.evaluation.journal import RUN_FILE
-from vinl.evaluation.merge import TABLE_FILE
-from vinl.evaluation.records import Results
-from vinl.evaluation.report import write_report
-from vinl.evaluation.results_file import results_as_dict, write_json
-from vinl.evaluation.shard import Shard
-from vinl.evaluation.table import TableRow, summarise_table
-from vinl.evaluation.table_config import PaperFigures, RowConfig, TableConfig
-from vinl.evaluation.table_report import write_table_report
+from vinl.config.output import write_json
 
 RESULTS_FILE, REPORT_FILE = "results.json", "report.html"
 

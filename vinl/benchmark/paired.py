@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from vinl.evaluation.metrics import BOOTSTRAP, MIN_METRES
-from vinl.evaluation.records import EpisodeRecord, Key
+from vinl.benchmark.metrics import MIN_METRES
+from vinl.chain.metrics import BOOTSTRAP
+from vinl.chain.records import EpisodeRecord, Key
 
 
 def compare_rows(

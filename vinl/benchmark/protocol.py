@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
+from vinl.benchmark.routes import describe_routes
+from vinl.benchmark.shard import Shard
+from vinl.benchmark.work import Row
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.episode import draw_routes
 from vinl.config.loader import dump_config
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.episodes import draw_routes
-from vinl.evaluation.routes import describe_routes
-from vinl.evaluation.shard import Shard
-from vinl.evaluation.work import Row
 from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan
 from vinl.world.start_goal import StartGoal

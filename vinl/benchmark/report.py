@@ -8,14 +8,14 @@ from typing import Any
 
 import jinja2
 
+from vinl.benchmark.metrics import aggregate_episodes
+from vinl.benchmark.table_config import PaperFigures, TableConfig
+from vinl.chain.failures import FAILURES, read_failure
+from vinl.chain.records import EpisodeRecord, Results
 from vinl.config.loader import load_config
-from vinl.evaluation.blame import FAILURES, read_failure
-from vinl.evaluation.describe import describe_environment
-from vinl.evaluation.drawing import draw_histogram, draw_map
-from vinl.evaluation.metrics import aggregate_episodes
-from vinl.evaluation.records import EpisodeRecord, Results
-from vinl.evaluation.results_file import write_text
-from vinl.evaluation.table_config import PaperFigures, TableConfig
+from vinl.config.output import write_text
+from vinl.config.versions import describe_environment
+from vinl.render.drawing import draw_histogram, draw_map
 
 _SHOWN = ("vinl", "vinl_no_clutter", "rough")
 """Rows of the paper's table that every report shows."""
@@ -62,7 +62,7 @@ def render_report(results: Results, command: str) -> str:
         draw_histogram([r.foot_steps / r.distance_m for r in walked], "foot collisions per metre"),
     ]
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("vinl.evaluation"), autoescape=True, undefined=jinja2.StrictUndefined
+        loader=jinja2.PackageLoader("vinl.render"), autoescape=True, undefined=jinja2.StrictUndefined
     )
     environment.filters["figure"] = format_figure
     environment.filters["failure"] = read_failure

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from vinl.evaluation.describe import describe_navigator, describe_plan, describe_policy, list_packages
-from vinl.evaluation.filming import missing_films
-from vinl.evaluation.journal import Journal, read_wall_seconds
-from vinl.evaluation.metrics import aggregate_episodes
-from vinl.evaluation.protocol import Protocol
-from vinl.evaluation.records import Episode, Key, Results
-from vinl.evaluation.video import name_film
-from vinl.evaluation.work import Row
+from vinl.benchmark.describe import describe_navigator, describe_plan
+from vinl.benchmark.journal import Journal, read_wall_seconds
+from vinl.benchmark.metrics import aggregate_episodes
+from vinl.benchmark.protocol import Protocol
+from vinl.benchmark.work import Row, missing_films
+from vinl.chain.records import Episode, Key, Results
+from vinl.config.versions import list_packages
+from vinl.policies.identity import describe_policy
+from vinl.render.video import name_film
 
 
 class Store:

@@ -9,8 +9,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from vinl.evaluation.metrics import aggregate_episodes
-from vinl.evaluation.records import Results
+from vinl.benchmark.metrics import aggregate_episodes
+from vinl.chain.records import Results
 
 _COLUMNS = (
     ("success", "success", 100, 1),

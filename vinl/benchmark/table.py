@@ -7,13 +7,13 @@ from dataclasses import asdict, dataclass
 from itertools import combinations
 from typing import Any
 
-from vinl.evaluation.describe import describe_environment
-from vinl.evaluation.metrics import aggregate_episodes
-from vinl.evaluation.paired import compare_rows
-from vinl.evaluation.records import Results
-from vinl.evaluation.results_file import SCHEMA
-from vinl.evaluation.shard import Shard
-from vinl.evaluation.table_config import PaperFigures
+from vinl.benchmark.metrics import aggregate_episodes
+from vinl.benchmark.paired import compare_rows
+from vinl.benchmark.shard import Shard
+from vinl.benchmark.table_config import PaperFigures
+from vinl.chain.records import Results
+from vinl.config.output import SCHEMA
+from vinl.config.versions import describe_environment
 
 PLAN_FIGURES = ("success", "spl", "distance_m", "foot_collisions_per_m", "paper_foot_collisions_per_m")
 """Figures that the summary has for each floor plan too."""

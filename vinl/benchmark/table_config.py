@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from vinl.chain.navigators.base import ORACLE
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.evaluation.navigator import ORACLE
 from vinl.policies.card import CARD_FILE
 from vinl.policies.io import list_policies
 from vinl.world.clutter import CLUTTER

@@ -12,10 +12,10 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from vinl.evaluation.blame import FAILURES, read_failure
-from vinl.evaluation.report import format_figure
-from vinl.evaluation.results_file import write_text
-from vinl.evaluation.table import PLAN_FIGURES, find_comparison
+from vinl.benchmark.report import format_figure
+from vinl.benchmark.table import PLAN_FIGURES, find_comparison
+from vinl.chain.failures import FAILURES, read_failure
+from vinl.config.output import write_text
 
 _PLAN_TITLES = dict(
     zip(
@@ -35,7 +35,7 @@ _PLAN_TITLES = dict(
 def render_table_report(data: Mapping[str, Any]) -> str:
     """The page as text, from what ``summarise_table`` returned."""
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("vinl.evaluation"), autoescape=True, undefined=jinja2.StrictUndefined
+        loader=jinja2.PackageLoader("vinl.render"), autoescape=True, undefined=jinja2.StrictUndefined
     )
     environment.filters |= {
         "figure": format_figure,

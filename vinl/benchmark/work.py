@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import TypeVar
 
-from vinl.evaluation.batches import is_steady, is_steady_navigator
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.crew import Context
-from vinl.evaluation.episodes import draw_setup
-from vinl.evaluation.navigator import Navigator
-from vinl.evaluation.records import Episode, Key
-from vinl.evaluation.rollout import run_episodes
-from vinl.evaluation.shard import Shard
+from vinl.benchmark.shard import Shard
+from vinl.chain.batching import is_steady, is_steady_navigator
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.episode import draw_setup
+from vinl.chain.navigators.base import Navigator
+from vinl.chain.records import Episode, Key
+from vinl.chain.rollout import run_episodes
+from vinl.chain.workers import Context
 from vinl.policies.policy import Policy
+from vinl.render.video import FilmJob, film, name_film
 from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan
 from vinl.world.start_goal import StartGoal
@@ -143,3 +145,25 @@ def run_job(context: Context, job: Job) -> dict[Key, Episode]:
         for episode in done:
             tell(episode)
     return {done[k].record.key: done[k] for k in rows}
+
+
+def missing_films(wanted: Sequence[Key], films: str, seed: int, folder: Path | None) -> set[Key]:
+    """The episodes to film: ``first`` of every plan, or ``all`` of the first seed, without those filmed before.
+
+    Args:
+        wanted: the episodes of the row.
+        films: ``none``, ``first`` or ``all``.
+        seed: the first one.
+        folder: where films may already lie; None: none does.
+    """
+    if films == "none":
+        return set()
+    chosen = {key for key in wanted if key[1] == seed and (films == "all" or key[2] == 0)}
+    return {key for key in chosen if folder is None or not (folder / name_film(*key)).exists()}
+
+
+def film_job(context: Context, job: FilmJob) -> str:
+    """One film, in whatever process."""
+    name = film(job, context.shared.config, context.is_stopped)
+    context.tell()
+    return name

@@ -53,7 +53,7 @@ class EvaluationConfig:
         ceiling: height of a ceiling that the cameras see [m]; none by default.
         min_metres: episodes shorter than this do not count in the rates per metre [m] [paper: 1 m].
         recovery: robots of a learned navigator that have not moved or turned for 3 s back up, turn away and walk on,
-            whatever it says (``vinl.evaluation.recovery``). The oracle always does so.
+            whatever it says (``vinl.chain.navigators.recovery``). The oracle always does so.
         oracle: how the shortest-path follower walks.
     """
 

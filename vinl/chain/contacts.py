@@ -7,7 +7,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from vinl.evaluation.scene import BLOCKS, FORCE_SENSORS, TOUCH_SENSORS, WALLS
+from vinl.chain.scene import BLOCKS, FORCE_SENSORS, TOUCH_SENSORS, WALLS
 from vinl.robot.aliengo import FOOT_GEOMS
 
 KINDS = ("foot_block", "foot_wall", "leg_block", "leg_wall", "trunk_block", "trunk_wall")

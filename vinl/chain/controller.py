@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
+from vinl.chain.depth_cameras import Eyes, open_eyes
+from vinl.chain.ground_map import GroundScan
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
-from vinl.evaluation.eyes import Eyes, open_eyes
-from vinl.evaluation.ground_scan import GroundScan
 from vinl.policies.card import find_detour, reads_ground
 from vinl.policies.policy import Policy
-from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
-from vinl.robot.observation import OBSERVATION_SIZE, PROPRIOCEPTION_SIZE, SCAN_SIZE, observe
+from vinl.robot.observation import SCAN_SIZE, observe
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
-
-MOUNT_REACH = 0.25
-"""So far from its place on the trunk a camera may be mounted [m]: anywhere at the robot's head."""
 
 
 class Senses:
@@ -78,47 +72,3 @@ def check_actions(actions: np.ndarray, n: int, locomotor: Policy) -> np.ndarray:
     if not np.isfinite(actions).all():
         raise InputError(f"locomotor {locomotor.card.name} returned actions that are not finite (NaN or infinite)")
     return actions
-
-
-def check_cameras(*seeing: Any) -> None:
-    """Refuse a policy or navigator that sees through a camera that the robot does not carry.
-
-    Raises:
-        InputError: the camera's name is that of neither camera, or it is mounted where neither could be.
-    """
-    for one in seeing:
-        camera = one.camera
-        if camera is None:
-            continue
-        name = one.card.name if hasattr(one, "card") else type(one).__name__
-        known = {mount.name: mount for mount in (LOCOMOTION_CAMERA, NAVIGATION_CAMERA)}
-        if camera.name not in known:
-            raise InputError(
-                f"{name} sees through a camera {camera.name!r} that the robot lacks"
-                f"{closest(camera.name, known)}; it carries: {', '.join(known)}"
-            )
-        away = float(np.linalg.norm(np.subtract(camera.position, known[camera.name].position)))
-        if away > MOUNT_REACH:
-            raise InputError(
-                f"{name} sees through a camera at {tuple(camera.position)} m on the trunk; the robot's {camera.name} "
-                f"camera is at {known[camera.name].position}, and can be moved by {MOUNT_REACH} m"
-            )
-
-
-def check_senses(policy: Policy) -> None:
-    """Refuse a policy that is no locomotor, or observes what there is not.
-
-    Raises:
-        InputError: it is of another kind, its table is neither one with a height scan nor proprioception alone, or its
-            commands are bent as they cannot be.
-    """
-    card = policy.card
-    if card.kind != "locomotion":
-        raise InputError(f"{card.name} is a {card.kind} policy; a locomotor (--loco, --policy) is a locomotion policy")
-    if card.observation_size not in (PROPRIOCEPTION_SIZE, OBSERVATION_SIZE):
-        raise InputError(
-            f"policy {card.name} observes {card.observation_size} numbers; the robot has {PROPRIOCEPTION_SIZE}, or "
-            f"{OBSERVATION_SIZE} with the height scan"
-        )
-    if find_detour(card) is not None and card.observation_size == PROPRIOCEPTION_SIZE:
-        raise InputError(f"policy {card.name}: commands are bent only for one that observes the height scan")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from vinl.evaluation.config import EvaluationConfig
+from vinl.chain.config import EvaluationConfig
 from vinl.robot.aliengo import DEFAULT_POSE
 from vinl.world.blocks import Blocks
 from vinl.world.clutter import ClutterPreset, scatter_blocks

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from vinl.evaluation.contact import KINDS
-from vinl.evaluation.records import EpisodeRecord
+from vinl.chain.contacts import KINDS
+from vinl.chain.records import EpisodeRecord
 from vinl.world.blocks import Blocks
 from vinl.world.endings import FALL, LOOPING, STUCK, TIMEOUT
 from vinl.world.free_space import FreeSpace

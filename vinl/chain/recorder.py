@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from vinl.evaluation.blame import FALL_WINDOW, find_cause
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.episodes import EpisodeSetup
-from vinl.evaluation.metrics import weigh_path, weigh_progress
-from vinl.evaluation.records import Episode, EpisodeRecord, EpisodeTrace
-from vinl.evaluation.walker import Walker
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.episode import EpisodeSetup
+from vinl.chain.failures import FALL_WINDOW, find_cause
+from vinl.chain.metrics import weigh_path, weigh_progress
+from vinl.chain.records import Episode, EpisodeRecord, EpisodeTrace
+from vinl.chain.robot import Walker
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.world.endings import FALL, STUCK, SUCCESS, name_late_end
 from vinl.world.free_space import FreeSpace

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from vinl.evaluation.contact import ContactReader
+from vinl.chain.contacts import ContactReader
 from vinl.policies.card import PolicyCard
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, STANDING_HEIGHT, SUBSTEPS, home_qpos
 

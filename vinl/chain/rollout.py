@@ -7,16 +7,16 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from vinl.evaluation.batches import ask_only, batch_navigator, batch_policy
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.episodes import EpisodeSetup
-from vinl.evaluation.eyes import open_eyes
-from vinl.evaluation.navigator import Navigator, Task, check_choice
-from vinl.evaluation.records import Episode
-from vinl.evaluation.scene import build_scene
-from vinl.evaluation.senses import give_senses
-from vinl.evaluation.tally import Tally
-from vinl.evaluation.walker import Walker, joint_targets
+from vinl.chain.batching import ask_only, batch_navigator, batch_policy
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.controller import give_senses
+from vinl.chain.depth_cameras import open_eyes
+from vinl.chain.episode import EpisodeSetup
+from vinl.chain.navigators.base import Navigator, Task, check_choice
+from vinl.chain.recorder import Tally
+from vinl.chain.records import Episode
+from vinl.chain.robot import Walker, joint_targets
+from vinl.chain.scene import build_scene
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.rotation import yaw_of

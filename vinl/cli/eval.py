@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from vinl.evaluation.progress import Progress
-    from vinl.evaluation.protocol import Protocol
-    from vinl.evaluation.work import Row
+    from vinl.benchmark.protocol import Protocol
+    from vinl.benchmark.work import Row
+    from vinl.cli.progress import Progress
 
 
 @dataclass(frozen=True)
@@ -82,14 +82,14 @@ class Options:
 def main(argv: list[str]) -> int:
     """Run the evaluation and print where its files lie."""
     options = parse_options(Options, argv, "eval")
+    from vinl.benchmark.evaluate import check_numbers, name_apart
+    from vinl.benchmark.outputs import check_folder
+    from vinl.benchmark.protocol import Films, Protocol
+    from vinl.benchmark.routes import read_routes
+    from vinl.benchmark.shard import Shard
+    from vinl.chain.config import EvaluationConfig
     from vinl.config.loader import load_config
-    from vinl.evaluation.config import EvaluationConfig
-    from vinl.evaluation.evaluate import check_numbers, name_apart
-    from vinl.evaluation.outputs import check_folder
-    from vinl.evaluation.protocol import Films, Protocol
-    from vinl.evaluation.results_file import check_out, strip_command
-    from vinl.evaluation.routes import read_routes
-    from vinl.evaluation.shard import Shard
+    from vinl.config.output import check_out, strip_command
     from vinl.world.readers import load_floorplans
 
     out = check_out(options.out)
@@ -120,10 +120,10 @@ def main(argv: list[str]) -> int:
 def _run_one(options: Options, out: Path, prepare: Callable[[], Protocol], workers: int, command: list[str]) -> None:
     from rich.console import Console
 
-    from vinl.evaluation.choosing import best_locomotor
-    from vinl.evaluation.evaluate import evaluate_rows
-    from vinl.evaluation.outputs import write_run
-    from vinl.evaluation.summary import print_summary
+    from vinl.benchmark.evaluate import evaluate_rows
+    from vinl.benchmark.outputs import write_run
+    from vinl.benchmark.summary import print_summary
+    from vinl.chain.choose import best_locomotor
 
     if options.rows or options.strict:
         raise InputError("--rows and --strict belong to a table; give --table too")
@@ -138,12 +138,12 @@ def _run_one(options: Options, out: Path, prepare: Callable[[], Protocol], worke
 def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], workers: int, command: list[str]) -> None:
     from rich.console import Console
 
+    from vinl.benchmark.evaluate import evaluate_rows
+    from vinl.benchmark.outputs import keep_table, leave_out, write_table
+    from vinl.benchmark.table import TableRow
+    from vinl.benchmark.table_config import TableConfig
+    from vinl.benchmark.table_report import print_table
     from vinl.config.loader import load_config
-    from vinl.evaluation.evaluate import evaluate_rows
-    from vinl.evaluation.outputs import keep_table, leave_out, write_table
-    from vinl.evaluation.table import TableRow
-    from vinl.evaluation.table_config import TableConfig
-    from vinl.evaluation.table_report import print_table
 
     for name, given in (("--loco", options.loco), ("--obstacles", options.obstacles)):
         if given is not None:
@@ -168,10 +168,10 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], wor
 
 
 def _load_row(loco: str, nav: str, obstacles: str, options: Options) -> Row:
+    from vinl.benchmark.work import Row
+    from vinl.chain.config import EvaluationConfig
+    from vinl.chain.navigators.choose import load_navigator
     from vinl.config.loader import load_config
-    from vinl.evaluation.config import EvaluationConfig
-    from vinl.evaluation.navigator import load_navigator
-    from vinl.evaluation.work import Row
     from vinl.policies.io import load_policy
 
     config = load_config(EvaluationConfig, options.config, options.set)
@@ -179,6 +179,6 @@ def _load_row(loco: str, nav: str, obstacles: str, options: Options) -> Row:
 
 
 def _progress(console: Console, out: Path) -> Progress:
-    from vinl.evaluation.progress import Progress
+    from vinl.cli.progress import Progress
 
     return Progress(console, f"{out} keeps them; the same command goes on from there")

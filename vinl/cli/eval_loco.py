@@ -51,18 +51,12 @@ def main(argv: list[str]) -> int:
     options = parse_options(Options, argv, "eval-loco")
     from rich.console import Console
 
-    from vinl.evaluation.courses import choose_commands
-    from vinl.evaluation.grounds import GroundConfig
-    from vinl.evaluation.locomotor import check_locomotor_numbers, compare_locomotors
-    from vinl.evaluation.locomotor_report import (
-        draw_contacts,
-        label_policies,
-        print_comparison,
-        print_figures,
-        results_as_dict,
-    )
-    from vinl.evaluation.progress import Progress
-    from vinl.evaluation.results_file import check_out, strip_command, write_json
+    from vinl.cli.progress import Progress
+    from vinl.config.output import check_out, strip_command, write_json
+    from vinl.courses.courses import choose_commands
+    from vinl.courses.evaluate import check_locomotor_numbers, compare_locomotors
+    from vinl.courses.grounds import GroundConfig
+    from vinl.courses.report import draw_contacts, label_policies, print_comparison, print_figures, results_as_dict
     from vinl.policies.io import load_policy
 
     if options.policy is not None and options.compare:
@@ -102,8 +96,8 @@ def main(argv: list[str]) -> int:
     else:
         print_figures(console, results[0])
     if options.step:
-        from vinl.evaluation.step import cross_block, describe_steps, draw_steps
-        from vinl.evaluation.step_film import film_steps
+        from vinl.courses.crossing import cross_block, describe_steps, draw_steps
+        from vinl.courses.crossing_film import film_steps
 
         ways = {name: cross_block(p, options.step_height) for name, p in zip(compared, policies, strict=True)}
         draw_steps(ways, options.step_height, out / "step.png")

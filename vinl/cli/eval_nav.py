@@ -57,20 +57,8 @@ def main(argv: list[str]) -> int:
     options = parse_options(Options, argv, "eval-nav")
     from rich.console import Console
 
-    from vinl.evaluation.nav_report import (
-        aggregate_by_distance,
-        aggregate_navigation,
-        print_navigation_summary,
-        render_navigation_report,
-    )
-    from vinl.evaluation.results_file import (
-        SCHEMA,
-        check_out,
-        describe_environment,
-        strip_command,
-        write_json,
-        write_text,
-    )
+    from vinl.config.output import SCHEMA, check_out, strip_command, write_json, write_text
+    from vinl.config.versions import describe_environment
     from vinl.nav.evaluation import END_REASONS, evaluate_kind
     from vinl.nav.evaluation_setup import (
         NavEvaluation,
@@ -80,6 +68,12 @@ def main(argv: list[str]) -> int:
         load_navigator,
     )
     from vinl.nav.measures import STUCK
+    from vinl.nav.report import (
+        aggregate_by_distance,
+        aggregate_navigation,
+        print_navigation_summary,
+        render_navigation_report,
+    )
 
     out = check_out(options.out)
     homes = (0 if options.floorplans else 200) if options.homes is None else options.homes

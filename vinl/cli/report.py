@@ -29,11 +29,11 @@ def main(argv: list[str]) -> int:
     options = parse_options(Options, argv, "report")
     from rich.console import Console
 
-    from vinl.evaluation.gather import gather_folders
-    from vinl.evaluation.outputs import write_run, write_table
-    from vinl.evaluation.results_file import check_out
-    from vinl.evaluation.summary import print_summary
-    from vinl.evaluation.table_report import print_table
+    from vinl.benchmark.gather import gather_folders
+    from vinl.benchmark.outputs import write_run, write_table
+    from vinl.benchmark.summary import print_summary
+    from vinl.benchmark.table_report import print_table
+    from vinl.config.output import check_out
 
     out, console = check_out(options.out), Console()
     found = gather_folders([Path(folder) for folder in options.folders], out, options.reference)

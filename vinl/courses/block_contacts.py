@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool
 
-from vinl.evaluation.contact import ContactReader
-from vinl.evaluation.scene import BLOCKS
+from vinl.chain.contacts import ContactReader
+from vinl.chain.scene import BLOCKS
 from vinl.robot.aliengo import FOOT_GEOMS, LEGS
 
 HEIGHT_EDGES = (0.10, 0.12, 0.14, 0.16, 0.18, 0.20)

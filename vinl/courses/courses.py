@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.evaluation.grounds import Ground
+from vinl.courses.grounds import Ground
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
 

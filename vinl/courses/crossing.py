@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vinl.evaluation.crew import one_thread
-from vinl.evaluation.grounds import Ground
-from vinl.evaluation.herd import MAX_TILT
-from vinl.evaluation.scene import build_scene
-from vinl.evaluation.touches import BlockReader, BlockTouches
-from vinl.evaluation.trial import sense_ground
-from vinl.evaluation.walker import Walker, joint_targets
+from vinl.chain.robot import Walker, joint_targets
+from vinl.chain.scene import build_scene
+from vinl.chain.workers import one_thread
+from vinl.courses.block_contacts import BlockReader, BlockTouches
+from vinl.courses.grounds import Ground
+from vinl.courses.herd import MAX_TILT
+from vinl.courses.trial import sense_ground
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, FOOT_RADIUS, LEGS
 from vinl.robot.rotation import yaw_of

@@ -10,12 +10,12 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-from vinl.evaluation.film_file import write_film
-from vinl.evaluation.step import ACROSS, DEPTH, Crossing
+from vinl.courses.crossing import ACROSS, DEPTH, Crossing
+from vinl.render.film_file import write_film
+from vinl.render.raytrace import RayRenderer, look_at
+from vinl.render.robot_shape import RobotShape
+from vinl.render.scene import BLOCK, plain_scene
 from vinl.robot.aliengo import CONTROL_DT
-from vinl.sensing.raytrace import RayRenderer, look_at
-from vinl.sensing.robot_shape import RobotShape
-from vinl.sensing.scene import BLOCK, plain_scene
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 

@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from vinl.chain.choose import check_senses
+from vinl.chain.workers import Context, Crew
 from vinl.config.errors import InputError
-from vinl.evaluation.courses import CommandRanges, Course, choose_commands, command_ranges
-from vinl.evaluation.crew import Context, Crew
-from vinl.evaluation.evaluate import describe_policy
-from vinl.evaluation.grounds import Ground, GroundConfig, build_ground
-from vinl.evaluation.herd import BoxHerd
-from vinl.evaluation.robot_records import RobotRecord, aggregate_robots
-from vinl.evaluation.senses import check_senses
-from vinl.evaluation.touches import BINS, bin_heights
-from vinl.evaluation.trial import run_trial
+from vinl.courses.block_contacts import BINS, bin_heights
+from vinl.courses.courses import CommandRanges, Course, choose_commands, command_ranges
+from vinl.courses.grounds import Ground, GroundConfig, build_ground
+from vinl.courses.herd import BoxHerd
+from vinl.courses.robot_records import RobotRecord, aggregate_robots
+from vinl.courses.trial import run_trial
+from vinl.policies.identity import describe_policy
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT
 

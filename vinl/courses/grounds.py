@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from vinl.chain.ground_map import GroundScan
+from vinl.chain.scene import build_scene
 from vinl.config.errors import InputError
-from vinl.evaluation.ground_scan import GroundScan
-from vinl.evaluation.scene import build_scene
 from vinl.sensing.depth import Mesh
 from vinl.sensing.detour import DetourConfig
 from vinl.world.blocks import Blocks

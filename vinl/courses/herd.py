@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vinl.evaluation.courses import Start
-from vinl.evaluation.touches import BlockReader, BlockTouches
-from vinl.evaluation.walker import Walker
+from vinl.chain.robot import Walker
+from vinl.courses.block_contacts import BlockReader, BlockTouches
+from vinl.courses.courses import Start
 
 MAX_TILT = 1.2566
 """A trunk tilted farther than this has fallen [rad]: 72 deg."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from vinl.evaluation.odometry import measure_twist
-from vinl.evaluation.trunk_motion import PERIOD, MotionRecord
+from vinl.chain.odometry import measure_twist
+from vinl.courses.trunk_motion import PERIOD, MotionRecord
 from vinl.robot.aliengo import CONTROL_DT
 
 STEP = PERIOD * CONTROL_DT

@@ -12,9 +12,10 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from vinl.evaluation.locomotor import LocomotorResults
-from vinl.evaluation.results_file import SCHEMA, describe_environment
-from vinl.evaluation.robot_records import HEIGHT_NAMES
+from vinl.config.output import SCHEMA
+from vinl.config.versions import describe_environment
+from vinl.courses.evaluate import LocomotorResults
+from vinl.courses.robot_records import HEIGHT_NAMES
 
 _COLUMNS = (
     ("foot_block_per_m", "feet/m", 2),

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from vinl.evaluation.metrics import BOOTSTRAP, wilson_interval
-from vinl.evaluation.touches import BINS, HEIGHT_EDGES
+from vinl.chain.metrics import BOOTSTRAP, wilson_interval
+from vinl.courses.block_contacts import BINS, HEIGHT_EDGES
 from vinl.robot.aliengo import CONTROL_DT
 
 FRONT, REAR = slice(0, 2), slice(2, 4)

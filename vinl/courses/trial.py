@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vinl.evaluation.courses import Course
-from vinl.evaluation.eyes import Eyes
-from vinl.evaluation.grounds import FieldScan, Ground
-from vinl.evaluation.herd import Herd
-from vinl.evaluation.robot_records import FRONT, REAR, RobotRecord
-from vinl.evaluation.senses import Senses
-from vinl.evaluation.touches import BlockTouches
-from vinl.evaluation.walker import joint_targets
+from vinl.chain.controller import Senses
+from vinl.chain.depth_cameras import Eyes
+from vinl.chain.robot import joint_targets
+from vinl.courses.block_contacts import BlockTouches
+from vinl.courses.courses import Course
+from vinl.courses.grounds import FieldScan, Ground
+from vinl.courses.herd import Herd
+from vinl.courses.robot_records import FRONT, REAR, RobotRecord
 from vinl.policies.card import find_detour, reads_ground
 from vinl.policies.policy import Policy
 from vinl.robot.rotation import rotate_inverse

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from vinl.chain.choose import check_senses
+from vinl.chain.controller import give_senses
+from vinl.chain.robot import Walker, joint_targets
+from vinl.chain.scene import build_scene
+from vinl.chain.workers import Context, Crew
 from vinl.config.errors import InputError
-from vinl.evaluation.crew import Context, Crew
-from vinl.evaluation.scene import build_scene
-from vinl.evaluation.senses import check_senses, give_senses
-from vinl.evaluation.walker import Walker, joint_targets
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
 from vinl.robot.rotation import matrix_of, yaw_of

@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import UInt8
 
 from vinl.gym.trip import Trip
-from vinl.sensing.chase import ChaseCamera
-from vinl.sensing.raytrace import RayRenderer
-from vinl.sensing.robot_shape import RobotShape
-from vinl.sensing.scene import plan_scene
+from vinl.render.chase_camera import ChaseCamera
+from vinl.render.raytrace import RayRenderer
+from vinl.render.robot_shape import RobotShape
+from vinl.render.scene import plan_scene
 
 SIZE = (640, 480)
 """Width and height [pixels]."""

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from vinl.evaluation.batches import batch_navigator, batch_policy
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.eyes import Eyes, open_eyes
-from vinl.evaluation.navigator import Navigator, check_choice, load_navigator
-from vinl.evaluation.senses import give_senses
-from vinl.evaluation.walker import joint_targets
+from vinl.chain.batching import batch_navigator, batch_policy
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.controller import give_senses
+from vinl.chain.depth_cameras import Eyes, open_eyes
+from vinl.chain.navigators.base import Navigator, check_choice
+from vinl.chain.navigators.choose import load_navigator
+from vinl.chain.robot import joint_targets
 from vinl.gym.trip import Trip
 from vinl.policies.policy import Policy
 

@@ -11,15 +11,15 @@ import numpy as np
 from gymnasium import spaces
 from jaxtyping import UInt8
 
+from vinl.chain.choose import choose_locomotor
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.episode import draw_routes, draw_setup
+from vinl.chain.odometry import measure_twist
+from vinl.chain.records import plain_record
+from vinl.chain.workers import one_thread
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.config.loader import load_config
-from vinl.evaluation.choosing import choose_locomotor
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.crew import one_thread
-from vinl.evaluation.episodes import draw_routes, draw_setup
-from vinl.evaluation.odometry import measure_twist
-from vinl.evaluation.records import plain_record
 from vinl.gym.actions import JOINT_REACH, check_action, joint_target_of
 from vinl.gym.chase import ChaseView
 from vinl.gym.drivers import Guide, Legs

@@ -9,10 +9,10 @@ import numpy as np
 from gymnasium import spaces
 from jaxtyping import Float
 
+from vinl.chain.depth_cameras import Eyes, open_eyes
+from vinl.chain.ground_map import GroundScan
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.evaluation.eyes import Eyes, open_eyes
-from vinl.evaluation.ground_scan import GroundScan
 from vinl.gym.trip import Trip
 from vinl.policies.card import NAVIGATION_TABLE
 from vinl.robot.cameras import LOCOMOTION_CAMERA, Camera

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.contact import KINDS
-from vinl.evaluation.episodes import EpisodeSetup
-from vinl.evaluation.navigator import Task
-from vinl.evaluation.records import Episode
-from vinl.evaluation.rollout import goal_in_heading_frame, tracking_errors
-from vinl.evaluation.scene import build_scene
-from vinl.evaluation.tally import Tally
-from vinl.evaluation.walker import Walker
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.contacts import KINDS
+from vinl.chain.episode import EpisodeSetup
+from vinl.chain.navigators.base import Task
+from vinl.chain.recorder import Tally
+from vinl.chain.records import Episode
+from vinl.chain.robot import Walker
+from vinl.chain.rollout import goal_in_heading_frame, tracking_errors
+from vinl.chain.scene import build_scene
 from vinl.robot.aliengo import CONTROL_DT, KD, KP
 from vinl.robot.rotation import yaw_of
 from vinl.world.free_space import FreeSpace

@@ -149,7 +149,7 @@ def _mjx_steps(simulation: Simulation, v: dict[str, Any], target: np.ndarray) ->
 def _mujoco_steps(simulation: Simulation, v: dict[str, Any], target: np.ndarray) -> Iterator[Row]:
     """Physics steps in MuJoCo C: spheres on the same height field, float64."""
     model = simulation.model
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD  # as in evaluation/scene.py
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD  # as in chain/scene.py
     for foot in FOOT_GEOMS:
         model.geom(foot).friction[0] = float(v["friction"])
     model.body("trunk").mass[0] += float(v["added_mass"])

@@ -11,8 +11,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from vinl.evaluation.drawing import draw_histogram, keep_low, outline_boxes, outline_way
-from vinl.evaluation.metrics import summarise
+from vinl.chain.metrics import summarise
+from vinl.render.drawing import draw_histogram, keep_low, outline_boxes, outline_way
 from vinl.robot.aliengo import LENGTH
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
@@ -114,7 +114,7 @@ def render_navigation_report(data: dict[str, Any], kinds: Sequence[tuple[Sequenc
         draw_histogram([r.geodesic_m for r in records], "geodesic distance [m]"),
     ]
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("vinl.evaluation"), autoescape=True, undefined=jinja2.StrictUndefined
+        loader=jinja2.PackageLoader("vinl.render"), autoescape=True, undefined=jinja2.StrictUndefined
     )
     environment.filters["interval"] = format_interval
     return environment.get_template("nav_report.html.j2").render(data=data, parts=parts, histograms=histograms)

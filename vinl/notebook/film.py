@@ -9,10 +9,10 @@ import weakref
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from vinl.chain.records import Episode
 from vinl.config.errors import InputError
-from vinl.evaluation.records import Episode
-from vinl.evaluation.video import POSE_DT, FilmJob, film
 from vinl.notebook.walk import Walk
+from vinl.render.video import POSE_DT, FilmJob, film
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
+from vinl.chain.navigators.base import Task
 from vinl.config.errors import InputError
-from vinl.evaluation.navigator import Task
 from vinl.policies.card import PolicyCard, locomotion_card
 from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP
 from vinl.robot.cameras import Camera

@@ -8,19 +8,20 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from vinl.chain.choose import choose_locomotor
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.depth_cameras import open_eyes
+from vinl.chain.episode import draw_routes, draw_setup
+from vinl.chain.navigators.base import ORACLE, Navigator
+from vinl.chain.navigators.choose import load_navigator
+from vinl.chain.records import Episode, EpisodeRecord, EpisodeTrace
+from vinl.chain.rollout import run_episodes
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.evaluation.choosing import choose_locomotor
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.episodes import draw_routes, draw_setup
-from vinl.evaluation.eyes import open_eyes
-from vinl.evaluation.navigator import ORACLE, Navigator, load_navigator
-from vinl.evaluation.panels import colour_depth
-from vinl.evaluation.records import Episode, EpisodeRecord, EpisodeTrace
-from vinl.evaluation.rollout import run_episodes
-from vinl.evaluation.video import POSE_DT
 from vinl.notebook.plans import draw_plan, open_plan
 from vinl.policies.policy import Policy
+from vinl.render.panels import colour_depth
+from vinl.render.video import POSE_DT
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
 from vinl.world.blocks import Blocks
 from vinl.world.clutter import CLUTTER

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from vinl.sensing.raytrace import RayRenderer, View, look_at
+from vinl.render.raytrace import RayRenderer, View, look_at
 
 
 class ChaseCamera:

@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from PIL import Image
 
-from vinl.evaluation.contact import KINDS
-from vinl.evaluation.records import Episode, EpisodeTrace
+from vinl.chain.contacts import KINDS
+from vinl.chain.records import Episode, EpisodeTrace
 from vinl.robot.aliengo import LENGTH
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-from vinl.evaluation.drawing import keep_low
-from vinl.evaluation.records import EpisodeRecord
+from vinl.chain.records import EpisodeRecord
+from vinl.render.drawing import keep_low
 from vinl.robot.aliengo import LENGTH, WIDTH
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes

@@ -10,11 +10,11 @@ import numpy as np
 import warp as wp
 from jaxtyping import Float, UInt8
 
+from vinl.render.picture_kernels import render_picture
+from vinl.render.robot_shape import BodyMesh
+from vinl.render.scene import Scene
 from vinl.sensing.depth import build_mesh
 from vinl.sensing.kernels import cast_rays
-from vinl.sensing.picture_kernels import render_picture
-from vinl.sensing.robot_shape import BodyMesh
-from vinl.sensing.scene import Scene
 
 _CREASE = math.radians(35)
 _FAR = 80.0

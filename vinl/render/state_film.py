@@ -10,10 +10,10 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-from vinl.evaluation.film_file import write_film
-from vinl.sensing.raytrace import RayRenderer, look_at
-from vinl.sensing.robot_shape import RobotShape
-from vinl.sensing.scene import BLOCK, FLOOR, WALL, Scene
+from vinl.render.film_file import write_film
+from vinl.render.raytrace import RayRenderer, look_at
+from vinl.render.robot_shape import RobotShape
+from vinl.render.scene import BLOCK, FLOOR, WALL, Scene
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import HeightField
 from vinl.world.mesh import heightfield_mesh

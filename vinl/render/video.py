@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from vinl.evaluation.config import EvaluationConfig
-from vinl.evaluation.film_file import write_film
-from vinl.evaluation.panels import MapPanel, colour_depth, compose
-from vinl.evaluation.records import Episode
-from vinl.evaluation.rollout import InterruptedRunError
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.records import Episode
+from vinl.chain.rollout import InterruptedRunError
+from vinl.render.chase_camera import ChaseCamera
+from vinl.render.film_file import write_film
+from vinl.render.panels import MapPanel, colour_depth, compose
+from vinl.render.raytrace import RayRenderer
+from vinl.render.robot_shape import RobotShape
+from vinl.render.scene import plan_scene
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
 from vinl.robot.rotation import matrix_of, yaw_of
-from vinl.sensing.chase import ChaseCamera
 from vinl.sensing.depth import DepthCamera
-from vinl.sensing.raytrace import RayRenderer
-from vinl.sensing.robot_shape import RobotShape
-from vinl.sensing.scene import plan_scene
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.mesh import floorplan_mesh
@@ -38,7 +38,6 @@ MAX_FRAMES = 300
 
 ROBOT_SIZE = (640, 512)
 """Width and height of the picture of the robot as rendered [pixels]; it is shown a quarter larger. 0.1 s a picture."""
-
 
 _CAMERAS = (LOCOMOTION_CAMERA, NAVIGATION_CAMERA)
 

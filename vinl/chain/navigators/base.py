@@ -4,18 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
-from vinl.evaluation.config import EvaluationConfig
-from vinl.policies.card import read_card
-from vinl.policies.io import find_policy, list_policies, load_policy
-from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import Camera
 from vinl.world.free_space import FreeSpace
 from vinl.world.start_goal import StartGoal
@@ -59,32 +53,6 @@ class Navigator(Protocol):
 
 ORACLE = "oracle"
 """The name of the shortest-path follower."""
-
-
-def load_navigator(name: str | Path, config: EvaluationConfig, device: str = "cpu") -> Navigator:
-    """The oracle, or a trained navigator.
-
-    Args:
-        name: ``"oracle"``, a shipped navigation policy's name, a policy folder or the folder of a training run.
-        config: how the oracle walks.
-        device: of a trained navigator.
-
-    Raises:
-        InputError: there is none of that name, or it is a policy of another kind.
-    """
-    if name == ORACLE:
-        from vinl.evaluation.oracle import OracleNavigator
-
-        return OracleNavigator(config.oracle)
-    from vinl.evaluation.learned_navigator import LearnedNavigator
-
-    bare, shipped = str(name).removeprefix("vinl/"), list_policies()
-    if bare not in shipped and not Path(name).exists():
-        known = [ORACLE, *[policy for policy in shipped if read_card(find_policy(policy)).kind == "navigation"]]
-        raise InputError(
-            f"unknown navigator {str(name)!r}{closest(bare, known)}; known: {', '.join(known)}; or give a policy folder"
-        )
-    return LearnedNavigator(load_policy(name, device), config.navigation_period * CONTROL_DT, config.recovery)
 
 
 def check_choice(choice: Any, n: int, navigator: Navigator) -> Float[np.ndarray, "n 2"]:

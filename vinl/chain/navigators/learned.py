@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from vinl.chain.navigators.base import Task
+from vinl.chain.navigators.recovery import Recovery, StuckPlaces
+from vinl.chain.odometry import measure_twist
 from vinl.config.errors import InputError
-from vinl.evaluation.navigator import Task
-from vinl.evaluation.odometry import measure_twist
-from vinl.evaluation.recovery import Recovery
-from vinl.evaluation.stuck_places import StuckPlaces
 from vinl.policies.card import NAVIGATION_TABLE, PolicyCard, find_previous
 from vinl.policies.policy import Policy
 from vinl.policies.velocity_range import VelocityRange

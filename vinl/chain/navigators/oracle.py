@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from vinl.chain.config import OracleConfig
+from vinl.chain.navigators.base import Task
+from vinl.chain.navigators.path import Way, plan_way
+from vinl.chain.navigators.recovery import Recovery
 from vinl.config.errors import InputError
-from vinl.evaluation.config import OracleConfig
-from vinl.evaluation.navigator import Task
-from vinl.evaluation.recovery import Recovery
-from vinl.evaluation.way import Way, plan_way
 from vinl.robot.cameras import Camera
 from vinl.robot.rotation import wrap_angle
 

@@ -1,0 +1,74 @@
+"""What a command leaves behind: the folder it may write to, files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from vinl.config.errors import InputError
+
+SCHEMA = 1
+"""Version of ``results.json``. Names stay; new ones may be added without a new version."""
+
+_IDLE, _IDLE_FLAGS = ("--out", "--workers", "--shard"), ("--fresh",)
+"""Options, with a value and without, that are left out of the command."""
+
+
+def strip_command(argv: Sequence[str]) -> list[str]:
+    """A command line without what no figure depends on, or what says only which part of them is measured."""
+    kept: list[str] = []
+    words = iter(argv)
+    for word in words:
+        if word in _IDLE:
+            next(words, None)
+        elif word not in _IDLE_FLAGS and word.split("=")[0] not in _IDLE:
+            kept.append(word)
+    return kept
+
+
+def check_out(out: str | Path) -> Path:
+    """The folder to write to, which need not exist yet.
+
+    Raises:
+        InputError: it, or a folder above it, is a file, or may not be written to.
+    """
+    out = Path(out)
+    for path in (out, *out.parents):
+        if path.is_dir():
+            if not os.access(path, os.W_OK):
+                raise InputError(f"--out {out}: {path} may not be written to; choose another folder")
+            return out
+        if path.exists():
+            raise InputError(f"--out {out}: {path} is a file; choose another folder")
+    return out
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole or not at all; an older one is replaced."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, scratch = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(scratch).chmod(0o644)
+        Path(scratch).replace(path)
+    except BaseException:
+        Path(scratch).unlink(missing_ok=True)
+        raise
+
+
+def write_json(path: Path, data: dict[str, Any]) -> None:
+    """Write JSON; one episode a line, so that a person can read it and two runs can be compared line by line."""
+    body = []
+    for key, value in data.items():
+        if key in ("episodes", "robots") and isinstance(value, list):
+            rows = ",\n".join("    " + json.dumps(row, allow_nan=False) for row in value)
+            body.append(f'  "{key}": [\n{rows}\n  ]')
+        else:
+            text = json.dumps(value, indent=2, allow_nan=False).replace("\n", "\n  ")
+            body.append(f'  "{key}": {text}')
+    write_text(path, "{\n" + ",\n".join(body) + "\n}\n")
