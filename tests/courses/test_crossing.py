@@ -7,6 +7,7 @@ import imageio.v2 as imageio
 import numpy as np
 import pytest
 
+from vinl.courses import crossing_film
 from vinl.courses.crossing import Crossing, cross_block, draw_steps
 from vinl.policies.io import load_policy
 from vinl.policies.policy import LocomotionPolicy
