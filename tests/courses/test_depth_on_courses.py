@@ -15,7 +15,7 @@ from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.policy import LocomotionPolicy
 from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP, home_qpos
 from vinl.robot.cameras import LOCOMOTION_CAMERA
-from vinl.robot.observation import describe
+from vinl.robot.observation import PROPRIOCEPTION
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import HeightField
 
@@ -29,7 +29,7 @@ def test_students_walk_beside_others(vision: str, trotting: LocomotionPolicy) ->
     action = {"scale": ACTION_SCALE, "default_pose": DEFAULT_POSE.tolist(), "kp": KP, "kd": KD}
     camera = LOCOMOTION_CAMERA.describe() if vision == "cnn" else None
     student = DepthPolicy(
-        network, PolicyCard("locomotion", vision, network.describe(), describe()[:-1], action, camera)
+        network, PolicyCard("locomotion", vision, network.describe(), PROPRIOCEPTION.describe(), action, camera)
     )
     results = compare_locomotors([student, trotting], "blocks", 2, 0.4)
     assert [len(r.robots) for r in results] == [2, 2]
