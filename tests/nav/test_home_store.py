@@ -7,16 +7,28 @@ import pytest
 import torch
 
 from vinl.config.errors import InputError
+from vinl.config.loader import build_config
 from vinl.nav.config import ClutterConfig, EpisodeConfig, HomesConfig, NavConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.fields import measure_near_clearance, spread_fields
-from vinl.nav.home_builder import build_home, prepare_home
+from vinl.nav.home_builder import FIELD_RESOLUTION, build_home, prepare_home
 from vinl.nav.home_store import HomeStore
 from vinl.nav.home_stream import HomeStream
 from vinl.world.floorplan import measure_clearance
 from vinl.world.geodesic import distance_field
 from vinl.world.grid import GridFrame
 from vinl.world.readers import load_floorplan
+
+
+def test_homes_of_other_layouts_come_in_their_fractions():
+    homes = {"count": 24, "workers": 0, "goals": 2, "starts": 32, "layouts": {"office": 0.5, "dead_ends": 0.5}}
+    config = build_config(NavConfig, {"homes": homes})
+    built = [build_home(seed, config) for seed in range(24)]
+    areas = np.array([home.cells * FIELD_RESOLUTION**2 for home in built if not isinstance(home, str)])
+    assert len(areas) > 20 and (areas > 150).mean() > 0.4 and areas.max() > 300  # offices are large
+    for layouts, words in (({"office": 0.8, "dead_ends": 0.4}, "more than 1"), ({"castle": 0.1}, "layout")):
+        with pytest.raises(InputError, match=words):
+            build_config(NavConfig, {"homes": {"layouts": layouts}})
 
 
 def test_fields_agree_with_those_of_the_world():

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from vinl.cli.app import main
 from vinl.config.errors import InputError
@@ -15,9 +16,10 @@ from vinl.config.paths import assets_dir
 from vinl.nav.config import NavConfig
 from vinl.nav.evaluation import END_REASONS, NavRecord, evaluate_kind
 from vinl.nav.evaluation_setup import NavEvaluation, build_homes, describe_episodes, load_navigator, name_kind
+from vinl.nav.failures import count_failures, print_failures
 from vinl.nav.home_store import HomeStore
 from vinl.nav.report import aggregate_by_distance, choose_drawn
-from vinl.nav.training import make_card
+from vinl.nav.training import check_seeds, make_card
 from vinl.nav.warm_start import build_actor
 from vinl.policies.io import save_policy
 from vinl.world.readers import expand_paths
@@ -101,6 +103,30 @@ def test_classes_of_distance_and_what_is_drawn():
     assert [(c["from_m"], c["to_m"], c["episodes"]) for c in classes] == [(5.0, 7.5, 21), (10.0, 15.0, 1)]
     worst, middle = choose_drawn(records)
     assert worst[0] == 1 and len(worst) == 6 and len(middle) == 3 and not set(worst) & set(middle)
+
+
+def test_failures_are_counted_by_kind_and_named_by_home(capsys):
+    records = [record(True, 0.9), record(False, 0.0), record(False, 0.0), replace(record(False, 0.0), plan="q")]
+    counted = count_failures(records, END_REASONS)
+    assert counted["lost"] == counted["reasons"]["stuck"] == 3 and counted["reasons"]["looping"] == 0
+    assert list(counted["homes"].items()) == [("p", 2), ("q", 1)] and "success" not in counted["reasons"]
+    print_failures(Console(width=100), {"offices": counted, "fine": count_failures(records[:1], END_REASONS)})
+    shown = capsys.readouterr().out
+    assert "offices" in shown and "p: 2, q: 1" in shown
+    print_failures(Console(), {"fine": count_failures(records[:1], END_REASONS)})
+    assert capsys.readouterr().out == ""
+
+
+def test_sets_that_judge_are_never_trained_on(tmp_path):
+    out = tmp_path / "out"
+    options = ["--policy", "oracle", "--sets", "dead_ends", "--episodes", "8", "--steps", "4", "--drift", "0.02"]
+    assert main(["eval-nav", *options, "--out", str(out)]) == 0
+    data = json.loads((out / "results.json").read_text())
+    assert data["kinds"]["dead_ends"]["homes"] == 20 and data["config"]["drift"] == 0.02
+    assert all(int(episode["plan"].removeprefix("home-")) >= 2_100_000_000 for episode in data["episodes"])
+    check_seeds(build_config(NavConfig, {"homes": {"seed": 900_000_000}}), 2)
+    with pytest.raises(InputError, match="kept for judging"):
+        check_seeds(build_config(NavConfig, {"homes": {"seed": 999_000_000}}), 2)
 
 
 def write_houses(path, count: int) -> str:

@@ -21,8 +21,11 @@ class Options:
     floorplans: tuple[str, ...] = ()
     """Floor plans beside the generated homes; FILE:50-99 are plans 50 to 99 of a JSON file, FILE:50- those from 50 on,
     FILE:0-/2 every second."""
+    sets: tuple[str, ...] = ()
+    """Floors that are kept for judging: offices (20 office floors), dead_ends (20 homes most of whose rooms have one
+    door)."""
     homes: int | None = None
-    """Generated homes; 200 by default, none where --floorplans is given."""
+    """Generated homes; 200 by default, none where --floorplans or --sets is given."""
     homes_seed: int = 1_000_000_000
     """Seed of the first home. Training takes seeds from its config's homes.seed on, 1 unless changed."""
     episodes: int = 1000
@@ -67,6 +70,7 @@ def main(argv: list[str]) -> int:
         describe_policy,
         load_navigator,
     )
+    from vinl.nav.failures import count_failures, print_failures
     from vinl.nav.measures import STUCK
     from vinl.nav.report import (
         aggregate_by_distance,
@@ -76,7 +80,7 @@ def main(argv: list[str]) -> int:
     )
 
     out = check_out(options.out)
-    homes = (0 if options.floorplans else 200) if options.homes is None else options.homes
+    homes = (0 if options.floorplans or options.sets else 200) if options.homes is None else options.homes
     if homes < 0:
         raise InputError(f"--homes must not be negative, got {homes}")
     if not 0.5 <= options.min_distance <= options.max_distance:
@@ -104,6 +108,7 @@ def main(argv: list[str]) -> int:
             options.floorplans,
             options.device,
             lambda done, total: status.update(f"building homes: {done} of {total}"),
+            options.sets,
         )
         for kind, store in stores.items():
 
@@ -117,7 +122,13 @@ def main(argv: list[str]) -> int:
     data = {
         "schema": SCHEMA,
         "command": ["vinl", "eval-nav", *strip_command(argv)],
-        "config": {**asdict(rules), "homes": homes, "homes_seed": options.homes_seed, "stuck_steps": STUCK},
+        "config": {
+            **asdict(rules),
+            "homes": homes,
+            "homes_seed": options.homes_seed,
+            "sets": options.sets,
+            "stuck_steps": STUCK,
+        },
         "policies": {"navigation": describe_policy(policy)},
         "environment": describe_environment(),
         "aggregate": aggregate_navigation(records, END_REASONS),
@@ -129,6 +140,7 @@ def main(argv: list[str]) -> int:
                 "dropped": kind.dropped,
                 "reasons": kind.reasons[:20],
                 "left_out": kind.left_out,
+                "failures": count_failures(kind.records, END_REASONS),
             }
             for kind in results
         },
@@ -146,6 +158,7 @@ def main(argv: list[str]) -> int:
             raise
         where = f"figures {out / 'results.json'}; no report.html: jinja2 is not installed (pip install jinja2)"
     print_navigation_summary(console, data)
+    print_failures(console, {name: kind["failures"] for name, kind in data["kinds"].items()})
     for kind in results:
         if kind.dropped or kind.left_out:
             console.print(

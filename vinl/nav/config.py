@@ -12,7 +12,7 @@ from vinl.nav.robot_config import CameraConfig, ExecutionConfig, MotionConfig, R
 from vinl.policies.card import PREVIOUS
 from vinl.sensing.odometry import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig
-from vinl.world.homes.config import HomeConfig
+from vinl.world.homes.config import HomeConfig, layout_config
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,8 @@ class HomesConfig:
         generator: what generated homes are like.
         plans: floor-plan files or names to train in beside the generated homes, see ``vinl.world.readers``; a range
             of a JSON file's plans as ``FILE:0-49``.
+        layouts: fraction of the generated homes of each other layout, such as ``office: 0.2``; the rest are as
+            ``generator`` has it. See ``vinl.world.homes.config.layout_config``.
         plans_share: share of the homes that are made from ``plans``, each time with other goals and starts.
         goals: goals in each home, each with a distance field.
         starts: spots in each home that starts are drawn from.
@@ -37,6 +39,7 @@ class HomesConfig:
     count: int = 1000
     seed: int = 1
     generator: HomeConfig = field(default_factory=HomeConfig)
+    layouts: dict[str, float] = field(default_factory=dict)
     plans: tuple[str, ...] = ()
     plans_share: float = 0.0
     goals: int = 16
@@ -54,6 +57,11 @@ class HomesConfig:
         if self.seed < 0:
             raise InputError(f"homes.seed must not be negative, got {self.seed}")
         check_number("homes.plans_share", self.plans_share, 0.0, 1.0)
+        for layout, fraction in self.layouts.items():
+            layout_config(layout, self.generator)
+            check_number(f"homes.layouts.{layout}", fraction, 0.0, 1.0)
+        if sum(self.layouts.values()) > 1.0:
+            raise InputError(f"homes.layouts must not sum to more than 1, got {sum(self.layouts.values()):g}")
         if self.plans_share > 0 and not self.plans:
             raise InputError("homes.plans_share is above 0, but homes.plans names no floor plan")
         check_number("homes.path_radius", self.path_radius, 0.1, 1.0)

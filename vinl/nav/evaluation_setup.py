@@ -20,6 +20,7 @@ from vinl.policies.io import load_policy
 from vinl.policies.velocity_range import VelocityRange
 from vinl.sensing.odometry import OdometryConfig
 from vinl.sensing.sensor_config import load_sensors
+from vinl.world.homes.judging import find_judging_set
 from vinl.world.readers import expand_paths, shipped_floorplans
 
 MOTIONS = {
@@ -134,6 +135,7 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
         config.homes,
         goals=rules.goals,
         starts=512,
+        layouts={},
         start_clearance=rules.start_clearance,
         fresh=0.0,
         plans=(),
@@ -171,6 +173,7 @@ def build_homes(
     plans: Sequence[str],
     device: str,
     progress: Callable[[int, int], None] | None = None,
+    sets: Sequence[str] = (),
 ) -> dict[str, HomeStore]:
     """Homes by kind.
 
@@ -181,6 +184,7 @@ def build_homes(
         plans: floor plans, see ``vinl.world.readers.expand_paths``.
         device: for the homes.
         progress: called with homes done and wanted, of each kind anew.
+        sets: names of ``vinl.world.homes.judging.JUDGING_SETS``.
 
     Raises:
         InputError: there are no homes, or none of a kind can be used.
@@ -189,6 +193,9 @@ def build_homes(
     if count:
         generated = replace(config, homes=replace(config.homes, count=count, seed=homes_seed))
         stores["generated"] = HomeStore.build(generated, device, progress)
+    for name, judged in {name: find_judging_set(name) for name in sets}.items():
+        own = replace(config, homes=replace(config.homes, seed=judged.first_seed))
+        stores[name] = HomeStore.from_plans(judged.generate(), own, device)
     groups: dict[str, list[str]] = {}
     for path in expand_paths(plans):
         groups.setdefault(name_kind(path), []).append(path)
@@ -196,7 +203,7 @@ def build_homes(
         own = replace(config, homes=replace(config.homes, seed=homes_seed))
         stores[kind] = HomeStore.from_paths(paths, own, device, progress=progress)
     if not stores:
-        raise InputError("there are no homes: give --homes N or --floorplans FILE")
+        raise InputError("there are no homes: give --homes N, --sets NAME or --floorplans FILE")
     return stores
 
 

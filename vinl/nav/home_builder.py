@@ -19,6 +19,7 @@ from vinl.nav.robot_config import CameraConfig
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import RESOLUTION, FloorPlan
+from vinl.world.homes.config import layout_config
 from vinl.world.mesh import BOTTOM_TRIANGLES, TOP_TRIANGLES, TRIANGLES_PER_BOX, box_mesh
 
 FINE = 2
@@ -89,8 +90,13 @@ def build_home(seed: int, config: NavConfig) -> BuiltHome | str:
         return build_plan(paths[rng.integers(len(paths))], seed, config)
     from vinl.world.homes import generate_home
 
+    generator = homes.generator
+    if homes.layouts:
+        drawn, layouts = rng.random(), list(homes.layouts)
+        at = int(np.searchsorted(np.cumsum(list(homes.layouts.values())), drawn, side="right"))
+        generator = layout_config(layouts[at], generator) if at < len(layouts) else generator
     try:
-        plan = generate_home(seed, homes.generator)
+        plan = generate_home(seed, generator)
     except InputError as error:
         return str(error)
     return prepare_home(plan, seed, config)

@@ -29,6 +29,7 @@ from vinl.rl.recurrent_model import RecurrentActorCritic
 from vinl.rl.recurrent_ppo import RecurrentPPO, RecurrentPpoSettings
 from vinl.rl.recurrent_storage import RecurrentStorage
 from vinl.rl.run_folder import RunFolder
+from vinl.world.homes.judging import RESERVED_FROM
 
 _SEEDS_BETWEEN = 10_000_000
 """Each process has homes of its own: their seeds lie this far apart."""
@@ -80,6 +81,7 @@ def train_navigator(
     if config is None:
         config = build_config(NavConfig, run.open(), source=str(run.path / "config.yaml"))
     check_minibatches(config)
+    check_seeds(config, int(os.environ.get("WORLD_SIZE", "1")))
     peers, device = join_peers(device)
     origin = None
     start = load_start(from_policy, config) if from_policy else None
@@ -169,6 +171,19 @@ def check_minibatches(config: NavConfig) -> None:
     if config.num_envs % config.ppo.minibatches:
         raise InputError(
             f"num_envs must be a multiple of ppo.minibatches, got {config.num_envs} and {config.ppo.minibatches}"
+        )
+
+
+def check_seeds(config: NavConfig, processes: int) -> None:
+    """Homes of trainings and homes that judge have different seeds.
+
+    Raises:
+        InputError: a process would draw homes from seeds that are kept for judging.
+    """
+    if config.homes.seed + processes * _SEEDS_BETWEEN > RESERVED_FROM:
+        raise InputError(
+            f"homes.seed {config.homes.seed}: seeds from {RESERVED_FROM:,} on are kept for judging; choose one below "
+            f"{RESERVED_FROM - processes * _SEEDS_BETWEEN:,}"
         )
 
 

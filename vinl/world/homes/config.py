@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from vinl.config.errors import InputError
 
 RANGES = {
-    "area": (30.0, 400.0),
+    "area": (30.0, 1000.0),
     "door_width": (0.75, 2.0),
     "door_height": (1.8, 3.0),
     "wall_height": (2.0, 6.0),
@@ -20,11 +20,18 @@ RANGES = {
 """What each range of ``HomeConfig`` may lie in."""
 
 
+LAYOUTS = ("home", "dead_ends", "office")
+"""What generated floors are: homes; homes whose rooms and doors make a tree, so that one leaves most rooms by the door
+that one came in by; office floors."""
+
+
 @dataclass(frozen=True)
 class HomeConfig:
     """Ranges and shares that homes are drawn from. Every range is (least, most), both included.
 
     Attributes:
+        layout: one of ``LAYOUTS``; of an office the shares of corridors, wings, open plans and lofts are not read, and
+            homes with dead ends have no open plan, passage or second door.
         area: floor between the middle lines of the outer walls [m2]; small homes are drawn more often than large ones.
         door_width: clear width of doors [m].
         door_height: height of doors, below the lintel [m].
@@ -44,6 +51,7 @@ class HomeConfig:
         askew_share: probability that a piece of furniture stands turned or in the way instead of at its wall.
     """
 
+    layout: str = "home"
     area: tuple[float, float] = (40.0, 250.0)
     door_width: tuple[float, float] = (0.75, 1.2)
     door_height: tuple[float, float] = (1.95, 2.2)
@@ -62,6 +70,8 @@ class HomeConfig:
     askew_share: float = 0.1
 
     def __post_init__(self) -> None:
+        if self.layout not in LAYOUTS:
+            raise InputError(f"homes: layout must be one of {', '.join(LAYOUTS)}, got {self.layout!r}")
         for name, (least, most) in RANGES.items():
             low, high = getattr(self, name)
             if not (math.isfinite(low) and math.isfinite(high) and least <= low <= high <= most):
@@ -77,3 +87,29 @@ class HomeConfig:
             raise InputError("homes: the highest door must not be higher than the lowest wall")
         if self.corridor_width[0] - max(self.inner_wall[1], self.outer_wall[1]) < RANGES["door_width"][0]:
             raise InputError(f"homes: a corridor less its walls must be {RANGES['door_width'][0]:g} m wide or more")
+
+
+_OWN = {
+    "home": {},
+    "dead_ends": {"area": (80.0, 300.0)},
+    "office": {
+        "area": (150.0, 600.0),
+        "corridor_width": (1.4, 2.6),
+        "door_width": (0.8, 1.1),
+        "furniture_density": (0.3, 1.2),
+        "loop_share": 0.1,
+    },
+}
+"""What each layout has of its own."""
+
+
+def layout_config(layout: str, config: HomeConfig | None = None) -> HomeConfig:
+    """Another layout with the walls, doors and furniture of a configuration, but sizes of its own.
+
+    Raises:
+        InputError: there is no such layout.
+    """
+    own = _OWN.get(layout)
+    if own is None:
+        raise InputError(f"homes: layout must be one of {', '.join(LAYOUTS)}, got {layout!r}")
+    return replace(config or HomeConfig(), layout=layout, **own)

@@ -11,6 +11,7 @@ from vinl.world.boxes import Boxes
 from vinl.world.floorplan import RESOLUTION, FloorPlan, RoomLabel, assemble_floorplan, frame_around
 from vinl.world.homes.config import HomeConfig
 from vinl.world.homes.furnish import furnish
+from vinl.world.homes.offices import draw_office
 from vinl.world.homes.reach import CHECKED_AT, keep_connected, paint_rects
 from vinl.world.homes.rooms import Room, draw_rooms, measure
 from vinl.world.homes.walls import Shell, raise_shell
@@ -76,7 +77,7 @@ def draw_shell(seed: int, config: HomeConfig) -> tuple[Random, Shell]:
 
 def _draw_shell(rng: Random, config: HomeConfig) -> Shell:
     for _ in range(ATTEMPTS):
-        rooms = draw_rooms(rng, config)
+        rooms = draw_office(rng, config) if config.layout == "office" else draw_rooms(rng, config)
         if not config.area[0] <= sum(room.area for room in rooms) <= config.area[1]:
             continue
         shell = raise_shell(rng, rooms, config)

@@ -14,27 +14,38 @@ _DEPTH = (3.2, 5.2)
 _CORE = 3.2
 """Least side of the block of rooms inside a ring of corridors [m]."""
 
+_LONGEST = 36.0
+"""A floor with one corridor is at most so long [m]."""
+
 _SMALL = 8.0
 """Rooms below this are washrooms and stores [m2]."""
 
 
 def draw_office(rng: Random, config: HomeConfig) -> list[Room]:
-    """The rooms of an office floor, all in one corner of the world, from (0, 0) on; its corridors are one room."""
+    """The rooms of an office floor, all in one corner of the world, from (0, 0) on; its corridors are one room. None
+    where no plan fits what was drawn."""
     low, high = config.area
     area = math.exp(rng.uniform(math.log(low), math.log(high * 0.98)))
     wide, depth = rng.uniform(*config.corridor_width), rng.uniform(*_DEPTH)
-    draw = rng.choice((_draw_spine, _draw_ring, _draw_comb))
-    halls, rects = draw(rng, area, wide, depth) or _draw_spine(rng, area, wide, depth)
+    plans = [_draw_spine, _draw_ring, _draw_comb]
+    rng.shuffle(plans)
+    drawn = (draw(rng, area, wide, depth) for draw in plans)
+    found = next((plan for plan in drawn if plan is not None), None)
+    if found is None:
+        return []
+    halls, rects = found
     rooms = [Room("hall", [_round(rect) for rect in halls])]
     rooms += [Room(kind, [rect]) for kind, rect in _name_rooms(rng, [_round(rect) for rect in rects])]
     return mirror_rooms(rng, rooms)
 
 
-def _draw_spine(rng: Random, area: float, wide: float, depth: float) -> tuple[list[Rect], list[Rect]]:
-    """One corridor from end to end; both ends are blind."""
+def _draw_spine(rng: Random, area: float, wide: float, depth: float) -> tuple[list[Rect], list[Rect]] | None:
+    """One corridor from end to end; both ends are blind. None if it would be too long."""
     other = rng.uniform(*_DEPTH)
     height = depth + wide + other
     width = area / height
+    if width > _LONGEST:
+        return None
     low, high = round(depth, 2), round(depth + wide, 2)
     rects = slice_rooms(0.0, width, 0.0, low, rng) + slice_rooms(0.0, width, high, height, rng)
     return [(0.0, low, width, high)], rects

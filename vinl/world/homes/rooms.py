@@ -47,19 +47,19 @@ def draw_rooms(rng: Random, config: HomeConfig) -> list[Room]:
     wings = _draw_wings(rng, area, config)
     rects: list[Rect] = []
     halls: list[Rect] = []
-    loft = rng.random() < config.loft_share
+    loft = rng.random() < config.loft_share and config.layout != "dead_ends"
     # larger homes have larger rooms, not only more of them
     room = rng.uniform(12.0, 22.0) * max(1.0, (area / 110.0) ** 0.5)
     for wing in wings:
         if loft:
             _cut_loft(wing, rng, rects)
         elif rng.random() >= config.corridor_share or not _cut_along_corridor(wing, rng, config, rects, halls):
-            _split(wing, rng, room, rects)
+            split_rooms(wing, rng, room, rects)
     rects = _drop_corner(rng, rects, halls, low)
     rooms = _name_rooms(rng, rects, halls)
-    if rng.random() < config.open_plan_share:
+    if rng.random() < config.open_plan_share and config.layout != "dead_ends":
         rooms = _open_plan(rng, rooms)
-    return _turn(rng, rooms)
+    return mirror_rooms(rng, rooms)
 
 
 def _draw_wings(rng: Random, area: float, config: HomeConfig) -> list[Rect]:
@@ -76,7 +76,7 @@ def _draw_wings(rng: Random, area: float, config: HomeConfig) -> list[Rect]:
     return [(0.0, 0.0, width, round(area / width, 2))]
 
 
-def _split(rect: Rect, rng: Random, size: float, out: list[Rect]) -> None:
+def split_rooms(rect: Rect, rng: Random, size: float, out: list[Rect]) -> None:
     """Halve until the rooms are about as large as wanted [m2]."""
     x0, y0, x1, y1 = rect
     w, h = x1 - x0, y1 - y0
@@ -87,7 +87,7 @@ def _split(rect: Rect, rng: Random, size: float, out: list[Rect]) -> None:
     least = NARROWEST if long < NARROWEST + LEAST_SIDE + 1.0 else LEAST_SIDE
     at = min(max(rng.uniform(0.3, 0.7) * long, least), long - least)
     for part in _halve(rect, at, w >= h if rng.random() < 0.85 or short < 2 * LEAST_SIDE else w < h):
-        _split(part, rng, size, out)
+        split_rooms(part, rng, size, out)
 
 
 def _halve(rect: Rect, at: float, across_x: bool) -> tuple[Rect, Rect]:
@@ -130,14 +130,14 @@ def _cut_along_corridor(rect: Rect, rng: Random, config: HomeConfig, out: list[R
             rooms.append((x0, y0, start, y1))
     for low_y, high_y in ((y0, a), (b, y1)):
         if high_y - low_y > 1.0:
-            rooms += _slice(start, end, low_y, high_y, rng)
+            rooms += slice_rooms(start, end, low_y, high_y, rng)
     hall = (start, a, end, b)
     out += [_swap(room) if turned else room for room in rooms]
     halls.append(_swap(hall) if turned else hall)
     return True
 
 
-def _slice(x0: float, x1: float, y0: float, y1: float, rng: Random) -> list[Rect]:
+def slice_rooms(x0: float, x1: float, y0: float, y1: float, rng: Random) -> list[Rect]:
     """Rooms side by side, of uneven widths, a few of them as narrow as a bath."""
     length, depth = x1 - x0, y1 - y0
     wanted = min(max(rng.uniform(10.0, 22.0) / depth, 2.6), 6.0)
@@ -165,13 +165,13 @@ def _cut_loft(rect: Rect, rng: Random, out: list[Rect]) -> None:
     w, h = x1 - x0, y1 - y0
     strip = rng.uniform(2.2, 3.6)
     if max(w, h) < strip + 4.5:
-        _split(rect, rng, 14.0, out)
+        split_rooms(rect, rng, 14.0, out)
         return
     small, large = _halve(rect, strip, w >= h)
     if rng.random() < 0.5:
         large, small = _halve(rect, max(w, h) - strip, w >= h)
     out.append(large)
-    _split(small, rng, rng.uniform(6.0, 14.0), out)
+    split_rooms(small, rng, rng.uniform(6.0, 14.0), out)
 
 
 def _swap(rect: Rect) -> Rect:
@@ -243,7 +243,7 @@ def _open_plan(rng: Random, rooms: list[Room]) -> list[Room]:
     return kept
 
 
-def _turn(rng: Random, rooms: list[Room]) -> list[Room]:
+def mirror_rooms(rng: Random, rooms: list[Room]) -> list[Room]:
     """Mirror and swap the axes at random."""
     x1 = max(rect[2] for room in rooms for rect in room.rects)
     y1 = max(rect[3] for room in rooms for rect in room.rects)

@@ -110,14 +110,16 @@ def _find_edges(rooms: list[Room]) -> list[Edge]:
 def _cut_doors(
     rng: Random, rooms: list[Room], edges: list[Edge], config: HomeConfig, outer: float, clear: list[list[Rect]]
 ) -> bool:
-    """Open the cheapest edges that join all rooms, and some more."""
+    """Open the cheapest edges that join all rooms, and some more; of a home with dead ends any edges, and no more."""
     ease = [EASE.get(room.kind, PRIVATE.get(room.kind, 4.0)) for room in rooms]
     margin = outer / 2 + 0.06
+    tree = config.layout == "dead_ends"
     found = []
     for edge in edges:
         i, j = edge.rooms
         if min(i, j) >= 0 and edge.high - edge.low - 2 * margin >= config.door_width[0]:
-            found.append((ease[i] + ease[j] + rng.uniform(0.0, 1.5), len(found), edge))
+            use = 0.0 if tree else ease[i] + ease[j]
+            found.append((use + rng.uniform(0.0, 1.5), len(found), edge))
     group = list(range(len(rooms)))
     left = len(rooms) - 1
     for cost, _, edge in sorted(found):
@@ -126,9 +128,9 @@ def _cut_doors(
             old, new = group[i], group[j]
             group = [new if g == old else g for g in group]
             left -= 1
-        elif cost > 6.5 or rng.random() > config.loop_share:
+        elif tree or cost > 6.5 or rng.random() > config.loop_share:
             continue
-        _cut_door(rng, edge, config, margin, ease[i] <= 2.0 and ease[j] <= 2.0, clear)
+        _cut_door(rng, edge, config, margin, not tree and ease[i] <= 2.0 and ease[j] <= 2.0, clear)
     return left == 0
 
 

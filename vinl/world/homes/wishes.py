@@ -56,6 +56,12 @@ TABLE: dict[str, list[Wish]] = {
         (make.armchair, 0.4, "corner"),
         (make.table_for_two, 0.2, "centre"),
     ],
+    "bureau": [
+        (make.shelf, 0.9, "wall"),
+        (make.shelf, 0.4, "wall"),
+        (make.table_for_two, 0.2, "centre"),
+    ],
+    "meeting": [(make.dining_table, 1.0, "centre"), (make.chest, 0.6, "wall"), (make.shelf, 0.3, "wall")],
     "hall": [(make.shoe_rack, 0.7, "wall"), (make.shoe_rack, 0.3, "wall")],
     "living": [
         (make.television, 0.8, "middle"),
@@ -84,6 +90,8 @@ def draw_wishes(rng: Random, room: Room) -> list[Wish]:
             wishes.append((make.dining_table, 0.9, "centre"))
         else:
             wishes.append((make.table_for_two, 0.8 if area > 8 else 0.3, "floor"))
+    elif kind == "bureau":
+        wishes += [(make.desk, 0.9, "wall")] * max(int(area / 7.0), 1)
     elif kind in ("living", "studio"):
         wishes += _wish_for_living(rng, area, kind == "studio" or (area > 30 and rng.random() < 0.3))
     wishes += TABLE["living" if kind == "studio" else kind]
