@@ -1,5 +1,6 @@
 # make demo    two homes, a few episodes, a video: about three minutes on two cores
 # make test    all tests
+# make fuzz    damaged files to everything that reads files: three minutes
 # make check   formatting, lint, types, the direction of imports
 # make clean   remove the environment and everything that was made
 # Each makes .venv when it is missing. PYTHON picks the interpreter (3.11 or newer).
@@ -8,7 +9,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= runs/demo
 
-.PHONY: demo test check format clean install install-dev
+.PHONY: demo test fuzz check format clean install install-dev
 .DELETE_ON_ERROR:
 
 demo: install
@@ -19,6 +20,9 @@ PLANS ?= $(shell $(BIN)/python -c "import vinl; print(*vinl.shipped_floorplans()
 
 test: install-dev
 	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+fuzz: install-dev
+	$(BIN)/python tests/fuzz/fuzz.py
 
 check: install-dev
 	$(BIN)/ruff format --check .

@@ -83,9 +83,9 @@ def test_floor_that_borders_on_the_unknown_is_kept(tmp_path):
 @pytest.mark.parametrize(
     "text, match",
     [
-        ("image: [", "broken YAML"),
-        ("just words", "not a ROS map"),
-        ("", "not a ROS map"),
+        ("image: [", "line 1, is not valid YAML"),
+        ("just words", "must hold keys and values"),
+        ("", "names no picture"),
         ("resolution: 0.05", "names no picture"),
         (HEAD.replace("map.png", "gone.png"), "does not exist"),
         (HEAD.replace("resolution: 0.1", ""), "'resolution:' is missing"),

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from vinl.benchmark.journal import EPISODES_FILE, RUN_FILE
 from vinl.benchmark.merge import TABLE_FILE, Part, group_parts, merge_parts, read_part
 from vinl.benchmark.outputs import check_folder, read_table
 from vinl.benchmark.table import TableRow
@@ -46,6 +47,22 @@ def gather_folders(folders: Sequence[Path], out: Path, reference: str | None = N
     Raises:
         InputError: no folder, a folder of something else, or folders that do not fit together.
     """
+    try:
+        return _gather(folders, out, reference)
+    except (KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:
+        raise InputError(f"{_name_all(folders)}: an entry is missing or of the wrong kind ({error!r})") from error
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{_name_all(folders)}: a value is broken ({error})") from error
+
+
+def _name_all(folders: Sequence[Path]) -> str:
+    """The files that are read, of all folders."""
+    return f"{RUN_FILE} and {EPISODES_FILE} in {', '.join(map(str, folders))}"
+
+
+def _gather(folders: Sequence[Path], out: Path, reference: str | None) -> Gathered:
     if not folders:
         raise InputError("vinl report needs at least one folder of vinl eval")
     if len({folder.resolve() for folder in folders}) < len(folders):

@@ -27,6 +27,9 @@ _WRITTEN = ("results.json", "report.html", RUN_FILE)
 
 _SHOWN = 3
 
+_LARGEST = 1e12
+"""No figure of an episode is larger."""
+
 
 class Journal:
     """The file ``episodes.jsonl`` of a folder, which only ever grows, and ``run.json``, which says what it belongs to.
@@ -118,6 +121,9 @@ def build_episode(data: Mapping[str, Any]) -> Episode:
     record, trace = dict(data["record"]), data["trace"]
     for name in ("start", "goal"):
         record[name] = tuple(record[name])
+    for name, value in record.items():
+        if isinstance(value, float) and not abs(value) < _LARGEST:
+            raise ValueError(f"{name} is {value:g}")
     shapes = {"path": 2, "contacts": 4, "blocks": 6}
     parts = {name: np.array(trace[name], np.float64).reshape(-1, width) for name, width in shapes.items()}
     return Episode(EpisodeRecord(**record), EpisodeTrace(**parts, poses=np.zeros((0, 19)), commands=np.zeros((0, 3))))

@@ -188,6 +188,6 @@ def read_card(folder: Path) -> PolicyCard:
         raise InputError(f"{path} must hold a JSON object, got {type(data).__name__}")
     card = build_config(PolicyCard, data, source=str(path))
     for row in card.observation:
-        if not isinstance(row.get("size"), int) or "name" not in row:
+        if not isinstance(row.get("size"), int) or not isinstance(row.get("name"), str):
             raise InputError(f"{path}: each row of observation needs a name and a whole size, got {row}")
     return card

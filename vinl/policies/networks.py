@@ -120,9 +120,9 @@ def build_network(description: dict[str, Any], source: str = "policy card") -> P
     """
     arguments = dict(description)
     name = arguments.pop("class", None)
-    if name in ELSEWHERE:
+    if isinstance(name, str) and name in ELSEWHERE:
         importlib.import_module(ELSEWHERE[name])
-    if name not in NETWORKS:
+    if not isinstance(name, str) or name not in NETWORKS:
         known = sorted({*NETWORKS, *ELSEWHERE})
         near = closest(str(name), known)
         raise InputError(f"{source}: unknown network class {name!r}{near}; known: {', '.join(known)}")
@@ -135,4 +135,5 @@ def build_network(description: dict[str, Any], source: str = "policy card") -> P
     try:
         return NETWORKS[name](**arguments)
     except (TypeError, ValueError, RuntimeError) as error:
-        raise InputError(f"{source}: network {name} cannot be built from {arguments}: {error}") from None
+        reason = str(error).splitlines()[0]
+        raise InputError(f"{source}: network {name} cannot be built from {arguments}: {reason}") from None

@@ -10,6 +10,9 @@ from jaxtyping import Bool, Float
 
 from vinl.config.errors import InputError
 
+FARTHEST = 1e6
+"""No coordinate and no size is larger than this [m]; what is comes from a broken file."""
+
 
 @dataclass(frozen=True, eq=False)
 class Boxes:
@@ -20,7 +23,7 @@ class Boxes:
             width along its own y axis [m], bottom z [m], top z [m].
 
     Raises:
-        InputError: if the shape is wrong, a number is not finite, or a size is not positive.
+        InputError: if the shape is wrong, a number is not finite or beyond ``FARTHEST``, or a size is not positive.
     """
 
     rows: Float[np.ndarray, "n 7"]
@@ -32,6 +35,8 @@ class Boxes:
             raise InputError(f"boxes need shape (n, 7), got {rows.shape}")
         if not np.isfinite(rows).all():
             raise InputError("boxes hold a number that is not finite")
+        if (np.abs(rows) > FARTHEST).any():
+            raise InputError(f"boxes hold a number beyond {FARTHEST:g}")
         if (rows[:, 3:5] <= 0).any() or (rows[:, 6] <= rows[:, 5]).any():
             raise InputError("boxes need positive length, width and height")
         object.__setattr__(self, "rows", rows)

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import distance_transform_edt
 
 from vinl.config.errors import InputError
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import FARTHEST, Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.raster import paint_boxes
 
@@ -22,8 +22,8 @@ BODY_HEIGHT = 0.6
 MARGIN = 0.5
 """Strip of outside that the grid keeps around the building [m]."""
 
-MAX_CELLS = 40_000_000
-"""More cells than this (a square of 316 m) is taken for a wrong scale."""
+MAX_CELLS = 9_000_000
+"""More cells than this (a square of 150 m) is taken for a wrong scale."""
 
 
 ROOM_TO_STAND = 0.4
@@ -92,12 +92,18 @@ def frame_around(
     Raises:
         InputError: if the plan would be beyond all reason large.
     """
-    first = np.floor((np.asarray(low) - MARGIN) / resolution)
-    cells = np.ceil((np.asarray(high) + MARGIN) / resolution) - first
-    if not np.isfinite(cells).all() or cells.prod() > MAX_CELLS:
-        size = np.asarray(high) - np.asarray(low)
+    low, high = np.asarray(low), np.asarray(high)
+    if not (np.maximum(np.abs(low), np.abs(high)) <= FARTHEST).all():
         raise InputError(
-            f"{source}: the plan would be {size[0]:.0f} m x {size[1]:.0f} m; check its scale (metres per pixel)"
+            f"{source}: the plan reaches farther than {FARTHEST:g} m from its origin; check its scale and its numbers"
+        )
+    first = np.floor((low - MARGIN) / resolution)
+    cells = np.ceil((high + MARGIN) / resolution) - first
+    if cells.prod() > MAX_CELLS:
+        size, side = high - low, np.sqrt(MAX_CELLS) * resolution
+        raise InputError(
+            f"{source}: the plan would be {size[0]:.4g} m x {size[1]:.4g} m, more than a square of {side:.0f} m; check "
+            "its scale (metres per pixel)"
         )
     x0, y0 = (first + 0.5) * resolution
     return GridFrame(float(x0), float(y0), resolution, (int(cells[1]), int(cells[0])))

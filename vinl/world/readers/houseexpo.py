@@ -8,14 +8,14 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.config.errors import InputError
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import FARTHEST, Boxes
 from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan, frame_around
 from vinl.world.readers.polygons import paint_polygon
 
 WALL_THICKNESS = 0.08
 """Walls stand on the outline, this thick [m]. Between rooms the outline runs along both faces of the real wall."""
 
-LARGEST = 200.0
+LARGEST = 150.0
 """A home wider than this is not in metres [m]."""
 
 
@@ -43,9 +43,10 @@ def build_houseexpo_plan(
     if not isinstance(verts, list) or len(verts) < 3:
         found = "none" if not verts else f"{len(verts)} points" if isinstance(verts, list) else "something else"
         raise InputError(f"{source}: a HouseExpo file needs an outline 'verts' of 3 points or more; found {found}")
-    points = np.array([[float(x), float(y)] for x, y in verts]) * (scale or 1.0)
+    points = np.array([[float(x), float(y)] for x, y in verts])
     if not np.isfinite(points).all():
         raise InputError(f"{source}: the outline has a coordinate that is not a number")
+    points = np.clip(points, -FARTHEST, FARTHEST) * (scale or 1.0)  # what is cut is refused for its size below
     points = points[np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > 1e-6]  # closed: first is last
     if len(points) < 3:
         raise InputError(f"{source}: the outline has fewer than 3 different points")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ DARK = 128
 LEAST_FLOOR = 4.0
 """A map whose walls enclose less known floor than this [m2] has no outer walls to speak of."""
 
-MAX_PIXELS = 50_000_000
+MAX_PIXELS = 49_000_000
 
 
 def read_image_plan(file: Path, resolution: float | None, min_speck: int, wall_height: float) -> FloorPlan:
@@ -73,9 +74,12 @@ def read_pixels(file: Path) -> tuple[UInt8[np.ndarray, "rows columns"], UInt8[np
         InputError: if the picture cannot be read.
     """
     try:
-        with Image.open(file) as picture:
+        with warnings.catch_warnings():  # Pillow warns of, or refuses, what is larger than it likes
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            picture = Image.open(file)
+        with picture:
             if picture.width * picture.height > MAX_PIXELS:
-                raise InputError(f"{file}: {picture.width} x {picture.height} pixels are too many; scale it down")
+                raise Image.DecompressionBombError
             if picture.mode.startswith(("I", "F")):
                 grey = np.asarray(picture, dtype=np.float64)
                 top = 65535.0 if grey.max() > 255 else 255.0
@@ -83,9 +87,12 @@ def read_pixels(file: Path) -> tuple[UInt8[np.ndarray, "rows columns"], UInt8[np
             pixels = np.asarray(picture.convert("RGBA"))
     except UnidentifiedImageError:
         raise InputError(f"{file}: this is not a picture that can be read; save it as PNG or PGM") from None
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        if isinstance(error, InputError):
-            raise
+    except (Image.DecompressionBombWarning, Image.DecompressionBombError):
+        raise InputError(
+            f"{file}: the picture is too large: up to {MAX_PIXELS / 1e6:.0f} million pixels are read, such as 7,000 x "
+            "7,000; scale it down and give its new scale with --resolution"
+        ) from None
+    except (OSError, SyntaxError, ValueError) as error:
         raise InputError(f"{file}: the picture is damaged ({error}); save it again as PNG or PGM") from None
     return np.rint(pixels[..., :3].mean(-1)).astype(np.uint8), pixels[..., 3]
 
@@ -115,8 +122,10 @@ def build_from_pixels(
         raise InputError(f"{file}: no wall is left after dropping specks of fewer than {min_speck} pixels")
     x, y, yaw = origin
     c, s = np.cos(yaw), np.sin(yaw)
-    size = np.array(walls.shape[::-1]) * resolution
-    edges = np.array([[0, 0], [size[0], 0], [0, size[1]], [size[0], size[1]]]) @ np.array([[c, s], [-s, c]]) + [x, y]
+    used = walls if known is None else walls | known[::-1]  # of a large empty canvas only what is drawn on it
+    (left, right), (bottom, top) = (np.flatnonzero(used.any(axis))[[0, -1]] + [0, 1] for axis in (0, 1))
+    corners = np.array([[left, bottom], [right, bottom], [left, top], [right, top]]) * resolution
+    edges = corners @ np.array([[c, s], [-s, c]]) + [x, y]
     frame = frame_around(edges.min(0), edges.max(0), str(file))
     try:
         first_row, first_column, last_row, last_column = split_rectangles(walls).T * resolution

@@ -66,7 +66,7 @@ def read_json_plan(
                 f"{source}: not a floor plan; a ProcTHOR house has 'rooms' and 'walls', a HouseExpo file has 'verts'"
             )
         return build_procthor_plan(house, name, source, file.parent / "asset_bbox.json")
-    except (KeyError, TypeError, IndexError, AttributeError) as error:
+    except (KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:
         raise InputError(f"{source}: the plan lacks an entry or has one of the wrong kind ({error!r})") from None
     except ValueError as error:
         if isinstance(error, InputError):
@@ -122,7 +122,7 @@ def _explain(file: Path, error: Exception) -> InputError:
 def _parse(text: str, where: str) -> Any:
     try:
         return json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # ValueError: also a number of thousands of digits
         raise InputError(f"{where}: broken JSON ({error}); is the file complete?") from None
 
 

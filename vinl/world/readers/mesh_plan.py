@@ -27,7 +27,7 @@ FLOOR_SHARE = 0.25
 BIN = 0.05
 """Heights are counted in bins of this size [m]."""
 
-HIGHEST, WIDEST, LOWEST = 15.0, 200.0, 1.0
+HIGHEST, WIDEST, LOWEST = 15.0, 150.0, 1.0
 """A home in metres is neither higher nor wider than this, nor lower [m]."""
 
 UNITS = {"millimetres": 0.001, "centimetres": 0.01, "inches": 0.0254, "decimetres": 0.1}
@@ -80,8 +80,10 @@ def _load(file: Path) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "f 3"]]
     except Exception as error:  # the loaders raise whatever comes
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"{file}: the mesh cannot be read ({reason}); is the file complete?") from None
-    if vertices.ndim != 2 or not len(vertices) or not len(faces):
+    if vertices.shape != (len(vertices), 3) or not len(vertices) or not len(faces):
         raise InputError(f"{file}: the mesh has no triangles (a cloud of points is not enough)")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(f"{file}: a triangle names a vertex that the mesh does not have; is the file complete?")
     if not np.isfinite(vertices).all():
         raise InputError(f"{file}: the mesh has a vertex that is not a number")
     return vertices, faces

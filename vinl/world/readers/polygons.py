@@ -29,7 +29,8 @@ def place_label(polygon: Float[np.ndarray, "k 2"]) -> tuple[float, float]:
     from shapely.ops import polylabel
 
     shape = shapely.Polygon(polygon)
-    point = polylabel(shape, 0.1) if shape.is_valid and shape.area > 0 else shape.centroid
+    with np.errstate(divide="ignore", invalid="ignore"):  # of slivers
+        point = polylabel(shape, 0.1) if shape.is_valid and shape.area > 0 else shape.centroid
     return float(point.x), float(point.y)
 
 

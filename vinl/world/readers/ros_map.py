@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from vinl.config.errors import InputError
+from vinl.config.yaml_text import read_yaml
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers.image import build_from_pixels, read_pixels
 
@@ -29,12 +29,12 @@ def read_ros_map(file: Path, min_speck: int, wall_height: float) -> FloorPlan:
     Raises:
         InputError: if the YAML or its picture is missing or broken, or encloses no floor.
     """
-    entries = _read_entries(file)
+    entries = read_yaml(file)
     image = entries.get("image")
     if not isinstance(image, str) or not image:
         raise InputError(f"{file}: the map names no picture; add a line 'image: map.png'")
     picture = Path(image) if Path(image).is_absolute() else file.parent / image
-    if not picture.is_file():
+    if not _is_there(picture):
         raise InputError(f"{file}: its picture {picture} does not exist; mend the line 'image:'")
     resolution = _read_number(file, entries, "resolution", None)
     if not 0.002 <= resolution <= 2.0:
@@ -59,17 +59,11 @@ def read_ros_map(file: Path, min_speck: int, wall_height: float) -> FloorPlan:
     return build_from_pixels(file, walls, known, resolution, min_speck, wall_height, _read_origin(file, entries))
 
 
-def _read_entries(file: Path) -> dict[str, Any]:
+def _is_there(picture: Path) -> bool:
     try:
-        entries = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{file}: broken YAML ({reason}); write lines like 'resolution: 0.05'") from None
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read ({error.strerror})") from None
-    if not isinstance(entries, dict):
-        raise InputError(f"{file}: not a ROS map; it needs lines 'image: map.png' and 'resolution: 0.05'")
-    return entries
+        return picture.is_file()
+    except OSError:  # a name that no file can have
+        return False
 
 
 def _read_number(file: Path, entries: dict[str, Any], key: str, default: float | None) -> float:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from vinl.config.errors import InputError
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import FARTHEST, Boxes
 from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan, frame_around
 from vinl.world.grid import GridFrame
 from vinl.world.raster import label_regions, paint_boxes
@@ -111,6 +111,8 @@ def _to_metres(entries: list[Any], scale: float) -> np.ndarray:
     rows = np.array([[float(v) for v in entry[:4]] for entry in entries]).reshape(-1, 4)
     if not np.isfinite(rows).all():
         raise InputError("a wall, door or icon has a coordinate that is not a number")
+    if (np.abs(rows) > FARTHEST / scale).any():
+        raise InputError(f"a wall, door or icon has a coordinate beyond {FARTHEST:g} m")
     return rows * scale * np.array([1.0, -1.0, 1.0, -1.0])
 
 
