@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from vinl.gait.arrays import constant
 from vinl.gait.config import GaitConfig
 from vinl.robot.aliengo import CONTROL_DT
 
@@ -23,21 +23,6 @@ _FOLLOW = 0.15
 
 STANDING = 0.05
 """Commands below this ask to stand [m/s, rad/s]."""
-
-
-def constant(xp: Any, array: np.ndarray, like: Any) -> Any:
-    """A constant array as ``xp`` has it, of the kind and on the device of another."""
-    if xp is np or not hasattr(xp, "from_numpy"):
-        return xp.asarray(array, dtype=like.dtype)
-    return _torch_constant(array.tobytes(), array.shape, str(array.dtype), like.dtype, like.device)
-
-
-@lru_cache(maxsize=256)
-def _torch_constant(data: bytes, shape: tuple[int, ...], kind: str, dtype: Any, device: Any) -> Any:
-    """Kept: a copy to a GPU at every control step would wait for the device."""
-    import torch
-
-    return torch.from_numpy(np.frombuffer(data, kind).reshape(shape).copy()).to(device=device, dtype=dtype)
 
 
 def wanted_period(xp: Any, config: GaitConfig, command: Any) -> Any:

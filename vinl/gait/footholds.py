@@ -1,6 +1,6 @@
 """Footholds chosen on a map: the cheapest place near Raibert's that neither foot nor shank would touch a block from.
 
-For numpy and jax.numpy alike (``xp``).
+For numpy, jax.numpy and torch alike (``xp``).
 """
 
 from __future__ import annotations
@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from vinl.gait.clock import constant, unison
+from vinl.gait.arrays import constant, take_along, to_index
+from vinl.gait.clock import unison
 from vinl.gait.config import GaitConfig
 from vinl.gait.ground_view import GroundView
 from vinl.gait.leg import SHANK_FRACTIONS, farthest, knee_from_foot
@@ -60,7 +61,7 @@ def plan_footholds(
     """Choose a foothold, an apex and the clock's rate for every robot.
 
     Args:
-        xp: ``numpy`` or ``jax.numpy``.
+        xp: ``numpy``, ``jax.numpy`` or ``torch``.
         config: of the gait.
         view: the ground; None: level, and nothing on it.
         gait: after ``state.tick``.
@@ -83,17 +84,17 @@ def plan_footholds(
     side = constant(xp, np.sign(stance_places(config)[:, 1]), level)[:, None]
     inward = xp.clip(-candidates[:, 1] * side - _INWARD[0], 0.0, None) / _INWARD[1]
     cost = cost + ((candidates[:, 0] / _WIDTH[0]) ** 2 + (candidates[:, 1] / _WIDTH[1]) ** 2 + inward**2)
-    moved = xp.sum((points - gait.target[:, :, None, :2]) ** 2, -1)
+    moved = ((points - gait.target[:, :, None, :2]) ** 2).sum(-1)
     cost = cost + xp.where(swinging[..., None], _CHANGE * xp.clip(moved, 0.0, 0.04), 0.0)
     best = xp.argmin(cost, -1)[..., None]
-    chosen = xp.take_along_axis(points, best[..., None], 2)[:, :, 0]
-    offset = xp.take_along_axis(xp.broadcast_to(candidates, points.shape), best[..., None], 2)[:, :, 0]
+    chosen = take_along(xp, points, best[..., None], 2)[:, :, 0]
+    offset = take_along(xp, xp.broadcast_to(candidates, points.shape), best[..., None], 2)[:, :, 0]
 
     start = xp.where(swinging[..., None], gait.lift, feet)
     base = start[..., 2]
     rise = view.height(chosen) + FOOT_RADIUS - base
     way = start[..., None, :2] + (chosen - start[..., :2])[..., None, :] * constant(xp, PATH, level)[:, None]
-    over = xp.max(view.crest(way), -1) + FOOT_RADIUS - base
+    over = xp.amax(view.crest(way), -1) + FOOT_RADIUS - base
     apex = xp.maximum(over, xp.clip(rise, 0.0, None)) + config.lift
     return Plan(offset, rise, apex, _choose_rates(xp, config, gait, command, blocked))
 
@@ -134,7 +135,7 @@ def obstruction(
     leg = xp.concatenate([points[..., None, :] + behind, (ground[..., None] + up)[..., None]], -1)
     foot = xp.concatenate([points, ground[..., None]], -1)[..., None, :]
     gap = view.clearance(xp.concatenate([foot, leg], -2))
-    short = xp.max(config.shank - gap[..., 1:], -1)
+    short = xp.amax(config.shank - gap[..., 1:], -1)
     too_far = xp.clip(xp.abs(ahead) - farthest(xp, 0 * along[0] + hip), 0.0, None).sum(-1)
     touches = _price(xp, FOOT_RADIUS + config.edge - gap[..., 0], 0) + _price(xp, short, 1)
     return touches + _OUT_OF_REACH * too_far
@@ -209,8 +210,8 @@ def _choose_rates(xp: Any, config: GaitConfig, gait: GaitState, command: Any, bl
         at = (later + k * gait.period[:, None, None] - left[..., None]) * speed[:, None, None]
         index = xp.clip((at - float(TRACK[0])) / float(TRACK[1] - TRACK[0]), 0, len(TRACK) - 1.001)
         below = xp.floor(index)
-        part, low = index - below, below.astype("int32")
-        read = xp.take_along_axis(cost, low, 2) * (1 - part) + xp.take_along_axis(cost, low + 1, 2) * part
+        part, low = index - below, to_index(xp, below)
+        read = take_along(xp, cost, low, 2) * (1 - part) + take_along(xp, cost, low + 1, 2) * part
         total = total + xp.clip(read, 0.0, 20.0)
     best = xp.take(rates, xp.argmin(total, -1))
     wanted = xp.where((speed > _LEAST_SPEED)[:, None], best, 1.0 + 0 * best)

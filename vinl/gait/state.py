@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from vinl.gait.clock import OFFSETS, constant, follow_period, is_moving, swing_fraction, wanted_period
+from vinl.gait.arrays import constant
+from vinl.gait.clock import OFFSETS, follow_period, is_moving, swing_fraction, wanted_period
 from vinl.gait.config import GaitConfig
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.kinematics import foot_positions

@@ -18,7 +18,11 @@ from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE
 NETWORKS: dict[str, type[PolicyNetwork]] = {}
 """Class name to class: what a policy card may name."""
 
-ELSEWHERE = {"DepthActor": "vinl.policies.depth_actor", "NavActor": "vinl.policies.nav_actor"}
+ELSEWHERE = {
+    "DepthActor": "vinl.policies.depth_actor",
+    "NavActor": "vinl.policies.nav_actor",
+    "SteppingActor": "vinl.policies.stepping_actor",
+}
 """Networks that register when their module is imported, and the module."""
 
 
@@ -127,7 +131,7 @@ def build_network(description: dict[str, Any], source: str = "policy card") -> P
         near = closest(str(name), known)
         raise InputError(f"{source}: unknown network class {name!r}{near}; known: {', '.join(known)}")
     for key, value in arguments.items():
-        if isinstance(value, str | bool):  # names and switches: the class knows which there are
+        if isinstance(value, str | bool | dict):  # names, switches, settings: the class knows which there are
             continue
         for size in value if isinstance(value, list) else [value]:
             if isinstance(size, bool) or not isinstance(size, int) or size < 1:

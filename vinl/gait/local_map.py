@@ -1,0 +1,140 @@
+"""A small height map about the robot, in its heading frame: what a network predicts in place of a map of the world.
+
+For numpy, jax.numpy and torch (``xp``). The planner reads it as it reads the world.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vinl.gait.arrays import take_along, to_index
+from vinl.gait.ground_view import CREST_RADIUS
+
+CELL = 0.05
+"""Side of a cell [m]: that of the ground's cells in training."""
+
+REACH = (-0.65, 1.25), (-0.45, 0.45)
+"""What the map covers, along and across [m]: from behind the rear feet's footholds to the front feet's next but one."""
+
+X, Y = (np.arange(round(low / CELL), round(high / CELL) + 1) * CELL for low, high in REACH)
+POINTS = np.stack(np.meshgrid(X, Y, indexing="ij"), -1).reshape(-1, 2)
+"""(741, 2) middles of the cells in the heading frame [m], x outer, y inner."""
+
+SHAPE = (len(X), len(Y))
+
+SOLID = 0.025
+"""What rises so far above the floor under the robot is an obstacle [m]."""
+
+_FAR = 0.25
+"""Distances from obstacles are held to at most this [m]."""
+
+_TOP_CELLS = 3
+"""An obstacle's height counts as far as this from it [cells]: farther points are not near it in any case."""
+
+
+class LocalMapView:
+    """A ``GroundView`` of predicted heights.
+
+    Args:
+        xp: ``numpy``, ``jax.numpy`` or ``torch``.
+        heights: (n, 741) of the ground at ``POINTS``, above the floor [m].
+        floor: (n,) height of the floor under the robot in the heading frame [m].
+    """
+
+    def __init__(self, xp: Any, heights: Any, floor: Any) -> None:
+        self._xp, self._floor = xp, floor
+        grid = heights.reshape(-1, *SHAPE)
+        self._heights = grid.reshape(len(heights), -1)
+        reach = round(CREST_RADIUS / CELL)
+        disc = [(i, j) for i in range(-reach, reach + 1) for j in range(-reach, reach + 1) if np.hypot(i, j) <= reach]
+        self._crest = self._highest(grid, disc).reshape(len(heights), -1)
+        self._distance, self._top = (x.reshape(len(heights), -1) for x in self._obstacles(grid))
+
+    def clearance(self, points: Any) -> Any:
+        """See ``GroundView``."""
+        xp = self._xp
+        i, j = self._cells(points)
+        i0, j0 = xp.floor(i), xp.floor(j)
+        i0, j0 = xp.clip(i0, 0, SHAPE[0] - 2), xp.clip(j0, 0, SHAPE[1] - 2)
+        a, b = i - i0, j - j0
+        corner = i0 * SHAPE[1] + j0
+
+        def read(step: int) -> Any:
+            return self._read(self._distance, corner + step)
+
+        beside = (1 - a) * ((1 - b) * read(0) + b * read(1))
+        beside = beside + a * ((1 - b) * read(SHAPE[1]) + b * read(SHAPE[1] + 1))
+        top = self._read(self._top, xp.round(i) * SHAPE[1] + xp.round(j))
+        above = points[..., 2] - self._over(points) - top
+        outside = xp.hypot(xp.clip(beside, 0, None), xp.clip(above, 0, None))
+        return outside + xp.clip(xp.maximum(beside, above), None, 0)
+
+    def height(self, xy: Any) -> Any:
+        """See ``GroundView``."""
+        return self._read_nearest(self._heights, xy)
+
+    def crest(self, xy: Any) -> Any:
+        """See ``GroundView``."""
+        return self._read_nearest(self._crest, xy)
+
+    def _over(self, points: Any) -> Any:
+        return self._floor.reshape(-1, *(1,) * (points.ndim - 2))
+
+    def _cells(self, xy: Any) -> tuple[Any, Any]:
+        xp = self._xp
+        i = xp.clip((xy[..., 0] - float(X[0])) / CELL, 0, SHAPE[0] - 1)
+        return i, xp.clip((xy[..., 1] - float(Y[0])) / CELL, 0, SHAPE[1] - 1)
+
+    def _read_nearest(self, grid: Any, xy: Any) -> Any:
+        i, j = self._cells(xy)
+        found = self._read(grid, self._xp.round(i) * SHAPE[1] + self._xp.round(j))
+        return found + self._over(xy)
+
+    def _read(self, grid: Any, index: Any) -> Any:
+        flat = to_index(self._xp, index).reshape(len(grid), -1)
+        return take_along(self._xp, grid, flat, 1).reshape(index.shape)
+
+    def _shifted(self, grid: Any, i: int, j: int, outside: float) -> Any:
+        """The grid seen from cells (i, j) farther back."""
+        xp, (rows, columns) = self._xp, SHAPE
+        if i:
+            edge = grid[:, : abs(i)] * 0 + outside
+            grid = xp.concatenate([grid[:, i:], edge] if i > 0 else [edge, grid[:, : rows + i]], 1)
+        if j:
+            edge = grid[:, :, : abs(j)] * 0 + outside
+            grid = xp.concatenate([grid[:, :, j:], edge] if j > 0 else [edge, grid[:, :, : columns + j]], 2)
+        return grid
+
+    def _highest(self, grid: Any, offsets: list[tuple[int, int]]) -> Any:
+        best = grid
+        for i, j in offsets:
+            best = self._xp.maximum(best, self._shifted(grid, i, j, -1.0))
+        return best
+
+    def _obstacles(self, grid: Any) -> tuple[Any, Any]:
+        """(n, rows, columns) distance from the edge of the nearest obstacle, negative inside, and its height [m]."""
+        xp, reach = self._xp, round(_FAR / CELL)
+        solid = grid > SOLID
+        square_out, square_in = (
+            xp.where(solid, a, b * 1.0) for a, b in ((0 * grid, 0 * grid + 9), (0 * grid + 9, 0 * grid))
+        )
+        squares = []
+        for square in (square_out, square_in):  # exact squared distances to cells, one axis after the other
+            for axis in (0, 1):
+                best = square
+                for k in range(1, reach + 1):
+                    for step in (-k, k):
+                        moved = self._shifted(square, *((step, 0) if axis == 0 else (0, step)), 9.0)
+                        best = xp.minimum(best, moved + (k * CELL) ** 2)
+                square = best
+            squares.append(xp.sqrt(square))
+        distance = xp.clip(
+            squares[0] - squares[1] - xp.where(solid, -CELL / 2 + 0 * grid, CELL / 2 + 0 * grid), -_FAR, _FAR
+        )
+        top = xp.where(solid, grid, 0 * grid)
+        for axis in (0, 1):
+            spread = [(k, 0) if axis == 0 else (0, k) for k in range(-_TOP_CELLS, _TOP_CELLS + 1) if k]
+            top = self._highest(top, spread)
+        return distance, top
