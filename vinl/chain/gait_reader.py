@@ -1,0 +1,120 @@
+"""The gait of robots whose policy knows the ground: clocks and footholds from a map, for the rows that it observes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from vinl.gait.config import GaitConfig
+from vinl.gait.footholds import plan_footholds
+from vinl.gait.ground_view import FieldView, GroundMap, build_ground_map
+from vinl.gait.observation import GAIT_ROWS
+from vinl.gait.path import gait_rows
+from vinl.gait.state import (
+    GaitState,
+    aim,
+    feet_in_heading_frame,
+    motion_between,
+    start_gait,
+    tick,
+    velocity_in_heading_frame,
+)
+from vinl.world.blocks import Blocks
+from vinl.world.boxes import Boxes
+from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
+from vinl.world.grid import GridFrame
+from vinl.world.heightfield import BLOCK, flat_field, raise_boxes
+
+RIM = 2.0
+"""Level ground around a plan [m]: no robot looks into the map of another episode."""
+
+_SCALE = np.concatenate([np.repeat(row.scale, row.size) for row in GAIT_ROWS])
+
+
+class GaitMaps:
+    """Maps of the ground for n robots, stacked along y in one grid; one map serves all if they share the ground.
+
+    Args:
+        maps: one for each robot, or one for all, all on the same frame.
+        frame: of each.
+    """
+
+    def __init__(self, maps: Sequence[GroundMap], frame: GridFrame) -> None:
+        rows, columns = frame.shape
+        self.ground = GroundMap(*(np.concatenate(grids) for grids in zip(*maps, strict=True)))
+        self.frame = GridFrame(frame.x0, frame.y0, frame.resolution, (len(maps) * rows, columns))
+        self._shift = np.arange(len(maps)) * rows * frame.resolution
+
+    def view(self, qpos: Float[np.ndarray, "n 19"]) -> FieldView:
+        """The ground as each robot sees it."""
+        at = qpos[:, :7].copy()
+        at[:, 1] += self._shift
+        return FieldView(np, self.ground, self.frame, at)
+
+
+def map_plan(plan: FloorPlan, blocks: Sequence[Blocks]) -> GaitMaps:
+    """Maps of a floor plan with the clutter of each episode."""
+    r, rim = plan.frame.resolution, round(RIM / plan.frame.resolution)
+    rows, columns = plan.frame.shape
+    frame = GridFrame(plan.frame.x0 - rim * r, plan.frame.y0 - rim * r, r, (rows + 2 * rim, columns + 2 * rim))
+    solid = plan.boxes[plan.boxes.rows[:, 5] < BODY_HEIGHT] if len(plan.boxes) else plan.boxes
+    different = blocks if any(len(b) for b in blocks) else blocks[:1]
+    maps = []
+    for some in different:
+        field, clutter = flat_field(frame), some.boxes()
+        raise_boxes(field, clutter, BLOCK)
+        maps.append(build_ground_map(field.heights, frame, solid + clutter))
+    return GaitMaps(maps, frame)
+
+
+def map_ground(heights: Float[np.ndarray, "rows columns"], frame: GridFrame, boxes: Boxes) -> GaitMaps:
+    """One map for all robots: heights of ground and blocks without walls [m], and all boxes that stand on it."""
+    return GaitMaps([build_ground_map(heights, frame, boxes)], frame)
+
+
+class GaitReader:
+    """Keeps the gaits of n robots, one control step after the other.
+
+    Args:
+        config: of the gait, from the policy's card.
+        maps: what they walk on.
+
+    Attributes:
+        gait: of all robots, as of the last ``read``; None before the first.
+    """
+
+    def __init__(self, config: GaitConfig, maps: GaitMaps) -> None:
+        self.config, self._maps = config, maps
+        self.gait: GaitState | None = None
+        self._last = np.zeros((0, 19))
+        self._fresh = np.zeros(0, bool)
+
+    def reset(self, which: Bool[np.ndarray, " n"]) -> None:
+        """These robots start anew with the next ``read``."""
+        if len(self._fresh):
+            self._fresh |= which
+
+    def read(
+        self, qpos: Float[np.ndarray, "n 19"], qvel: Float[np.ndarray, "n 18"], command: Float[np.ndarray, "n 3"]
+    ) -> Float[np.ndarray, "n 36"]:
+        """One control step on: the rows of the gait, scaled, in the order of ``GAIT_ROWS``."""
+        feet = feet_in_heading_frame(np, qpos)
+        start = start_gait(np, self.config, feet)
+        if self.gait is None or len(self._last) != len(qpos):
+            gait, motion = start, np.zeros((len(qpos), 4))
+        else:
+            gait = GaitState(
+                *(
+                    np.where(self._fresh.reshape(-1, *(1,) * (new.ndim - 1)), new, old)
+                    for new, old in zip(start, self.gait, strict=True)
+                )
+            )
+            motion = np.where(self._fresh[:, None], 0.0, motion_between(np, self._last, qpos))
+        self._last, self._fresh = qpos.copy(), np.zeros(len(qpos), bool)
+        gait = tick(np, self.config, gait, motion, command, feet)
+        velocity = velocity_in_heading_frame(np, qpos, qvel)
+        plan = plan_footholds(np, self.config, self._maps.view(qpos), gait, velocity, command, feet)
+        self.gait = aim(np, self.config, gait, plan, velocity, command, feet)
+        return gait_rows(np, self.config, self.gait, feet) * _SCALE
