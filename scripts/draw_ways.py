@@ -8,6 +8,7 @@ One panel for each policy; all have the same starts and commands. Needs nothing 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,9 +40,9 @@ class WatchedHerd(BoxHerd):
         self.places: list[Float[np.ndarray, "n 2"]] = []
         self.hits: list[np.ndarray] = []
 
-    def step(self, targets: Float[np.ndarray, "n 12"]) -> None:
+    def step(self, targets: Float[np.ndarray, "n 12"], rows: Sequence[int] | None = None) -> None:
         """One control step."""
-        super().step(targets)
+        super().step(targets, rows)
         self.places.append(self.qpos[:, :2].copy())
         self.hits.append(np.concatenate([self.touches.feet, self.touches.legs], 1))
 

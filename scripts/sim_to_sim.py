@@ -52,6 +52,9 @@ FIGURES = (
 class FieldHerd:
     """Robots in MJX, where blocks are bumps of a height field and bodies are spheres; see ``herd.Herd``."""
 
+    strain = None
+    """It does not tell what a step took."""
+
     def __init__(self, ground: Ground, kp: float, kd: float, n: int) -> None:
         self._simulation = Simulation(ground.field, kp, kd, ground.blocks)
         self.qpos, self.qvel = np.zeros((n, 19)), np.zeros((n, 18))

@@ -65,7 +65,8 @@ def test_commands_are_those_of_the_training_but_not_faster(standing: LocomotionP
 
 
 def test_commands_of_every_name_stay_in_their_ranges(standing: LocomotionPolicy) -> None:
-    assert choose_commands(None, "blocks") == "turns" and choose_commands(None, "flat") == "trained"
+    defaults = {"blocks": "home", "litter": "steady", "rooms": "navigator", "flat": "trained"}
+    assert {terrain: choose_commands(None, terrain) for terrain in defaults} == defaults
     for name in COMMANDS:
         ranges = command_ranges(name, [standing])
         commands, fresh = draw_commands(ranges, np.random.default_rng(0), 20_000)
@@ -77,6 +78,9 @@ def test_commands_of_every_name_stay_in_their_ranges(standing: LocomotionPolicy)
     assert (np.diff(np.flatnonzero(fresh)) % 25 == 0).all()
     assert (asked == 0).all(1).any() and ((asked[:, 0] == 0) & (asked[:, 2] != 0)).any()
     assert draw_commands(FIXED["turns"], np.random.default_rng(0), 20_000)[0][:, 0].min() >= 0.3
+    home = draw_commands(FIXED["home"], np.random.default_rng(0), 20_000)[0]
+    assert home[:, 0].min() >= 0.3 and home[:, 0].max() <= 0.8 and 0.5 < np.abs(home[:, 2]).max() <= 0.6
+    assert (draw_commands(FIXED["steady"], np.random.default_rng(0), 900)[0] == [0.4, 0.0, 0.0]).all()
 
 
 def test_all_policies_meet_the_same_courses(standing: LocomotionPolicy, trotting: LocomotionPolicy) -> None:
@@ -129,6 +133,8 @@ def test_figures_of_known_records() -> None:
         ({"seconds": float("nan")}, "--seconds"),
         ({"terrain": "swamp"}, "--terrain"),
         ({"terrain": "blocks", "density": -1.0}, "--density"),
+        ({"terrain": "blocks", "density": 10.0}, "--density"),
+        ({"terrain": "litter", "density": 31.0}, "--density"),
         ({"terrain": "rough", "level": 10}, "--level"),
         ({"level": 3}, "--level"),
         ({"terrain": "blocks", "level": 3}, "--level"),

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from vinl.courses.crossing import Crossing, describe_steps
 from vinl.courses.grounds import GroundConfig, build_ground
 from vinl.courses.robot_records import RobotRecord, aggregate_robots
 
@@ -21,13 +20,3 @@ def test_one_is_a_robot_that_walks_as_if_there_were_no_blocks():
     records = [RobotRecord(k, "blocks", None, steps=1000, metres=5.0, over_block_steps=70) for k in range(4)]
     assert aggregate_robots(records, covered=0.07)["trunk_over_blocks"] == pytest.approx(1.0)
     assert "trunk_over_blocks" not in aggregate_robots(records)
-
-
-def test_crossings_are_counted_in_words():
-    no, yes = np.zeros((3, 4), bool), np.eye(3, 4, dtype=bool)
-
-    def way(feet, legs, done):
-        return Crossing(np.zeros((3, 19)), np.zeros((3, 4, 3)), feet, legs, done)
-
-    text = describe_steps([way(no, no, True), way(yes, no, True), way(no, yes, True), way(no, no, False)])
-    assert text.startswith("1 of 4") and "1 not finished" in text and "feet 3, legs 3" in text

@@ -12,6 +12,7 @@ from vinl.robot.aliengo import (
     FOOT_RADIUS,
     JOINTS,
     LEGS,
+    MASS,
     SHANK_SPHERES,
     TRUNK_SPHERES,
     home_qpos,
@@ -48,7 +49,7 @@ def model(request) -> mujoco.MjModel:
 
 
 def test_weighs_what_the_maker_says(model):
-    assert model.body_mass.sum() == pytest.approx(24.937, abs=1e-6)
+    assert model.body_mass.sum() == pytest.approx(24.937, abs=1e-6) == MASS
     per_body = {model.body(k).name: model.body_mass[k] for k in range(1, model.nbody)}
     assert per_body["trunk"] == pytest.approx(12.229)
     for leg in LEGS:

@@ -34,15 +34,10 @@ class ContactReader:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         self._data = data
-        part = np.full(model.ngeom, -1)
-        for g in range(model.ngeom):
-            body = model.body(model.geom_bodyid[g]).name
-            if model.geom(g).name in FOOT_GEOMS:
-                part[g] = 0
-            elif body.endswith(("_hip", "_thigh", "_calf")):
-                part[g] = 1
-            elif body == "trunk":
-                part[g] = 2
+        names = [model.body(k).name for k in range(model.nbody)]
+        of_body = [1 if name.endswith(("_hip", "_thigh", "_calf")) else 2 if name == "trunk" else -1 for name in names]
+        part = np.array(of_body)[model.geom_bodyid]
+        part[[model.geom(name).id for name in FOOT_GEOMS]] = 0
         obstacle = np.full(model.ngeom, -1)
         for k, name in enumerate((BLOCKS, WALLS)):
             obstacle[model.geom_bodyid == model.body(name).id] = k

@@ -1,45 +1,65 @@
-"""``vinl eval-loco``: the locomotor alone in MuJoCo C."""
+"""``vinl eval-loco``: the low-level locomotion policy alone in MuJoCo C."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from vinl.cli.options import parse_options
 from vinl.config.errors import InputError
 
+if TYPE_CHECKING:
+    from vinl.policies.policy import Policy
+
+_BARS = {"height": (0.1,), "depth": 0.2, "speed": 0.5, "crossings": 32}
+"""Options of bars alone, and what they are if not given."""
+
+_COURSES = {"commands": None, "robots": 64, "seconds": 20.0, "density": None, "level": None}
+"""Options of all other terrains."""
+
 
 @dataclass(frozen=True)
 class Options:
-    """Let robots follow random commands and measure tracking, falls and contacts: results.json and a picture."""
+    """Let robots walk on level floor, rough ground, blocks, litter or bars; measure tracking, falls and contacts."""
 
     out: str
-    """Folder for results.json, contacts.png (on blocks) and what --step draws."""
+    """Folder for results.json, contacts.png (on blocks) and what --video films."""
     policy: str | None = None
     """A shipped policy's name, or a policy folder; rough by default."""
     compare: tuple[str, ...] = ()
     """Several policies in place of --policy: all on the same courses, one table."""
     terrain: str = "flat"
-    """flat, rough (the terrains of stage 1), blocks or rooms (small ones, with corners, doorways and blocks)."""
+    """flat, rough (the terrains of stage 1), blocks, litter (objects of 5-15 cm, 3-10 cm high), rooms (small ones, with
+    corners, doorways and blocks) or bars (a corridor 1 m wide with a bar across it: no way around)."""
+    height: tuple[float, ...] | None = None
+    """Heights of the bars [m], one after another; 0.1 if not given."""
+    depth: float | None = None
+    """Depth of the bars, along the corridor [m]; 0.2 if not given."""
+    speed: float | None = None
+    """Forward speed over bars [m/s]; 0.5 if not given. Robots are steered along the middle by yaw rates."""
+    crossings: int | None = None
+    """Crossings of each policy at each height of the bars, from starts at other distances; 32 if not given."""
     commands: str | None = None
-    """turns (0.3-1 m/s and up to 1 rad/s; the default on blocks), straight, spin (on the spot), back (0.2-0.4 m/s
-    backwards), navigator (0-1 m/s and up to 60 deg/s, changed every 0.5-4 s, standing and turning on the spot included;
-    the default in rooms), trained (what the policy was trained for; the default elsewhere) or forward (the same without
-    sideways)."""
-    robots: int = 64
-    """How many robots for each policy."""
-    seconds: float = 20.0
-    """How long [s]."""
+    """home (0.3-0.8 m/s and up to 0.6 rad/s; the default on blocks), steady (0.4 m/s straight on; the default on
+    litter), turns (0.3-1 m/s and up to 1 rad/s), straight, spin (on the spot), back (0.2-0.4 m/s backwards), navigator
+    (0-1 m/s and up to 60 deg/s, changed every 0.5-4 s, standing and turning on the spot included; the default in
+    rooms), trained (what the policy was trained for; the default elsewhere) or forward (the same without sideways)."""
+    robots: int | None = None
+    """How many robots for each policy; 64 if not given."""
+    seconds: float | None = None
+    """How long [s]; 20 if not given."""
     seed: int = 0
     """Of terrain, starts and commands."""
-    density: float = 1.0
-    """Blocks per m2, for blocks and, on level 9 (fewer below), for rooms; 0 is no block under the same rules."""
+    density: float | None = None
+    """Blocks (1 if not given) or objects of litter (10) per m2; in rooms of level 9, fewer below. 0 is none under the
+    same rules."""
     level: int | None = None
     """Level of all robots, 0 to 9, for rough and rooms; 1 to 9 by turns if not given."""
-    step: bool = False
-    """Also let every policy walk straight over one block: step.png (heights of the feet) and step.mp4."""
-    step_height: float = 0.15
-    """Height of that block [m]."""
+    video: bool = False
+    """Film the first crossing of every bar from the side (bar_10cm.mp4), and draw the heights of the feet in the first
+    eight (bar_10cm.png)."""
     workers: int | None = None
     """Processes; the number of cores by default. Results do not depend on it."""
     device: str = "cpu"
@@ -49,61 +69,104 @@ class Options:
 def main(argv: list[str]) -> int:
     """Run the evaluation and print its figures."""
     options = parse_options(Options, argv, "eval-loco")
-    from rich.console import Console
-
-    from vinl.cli.progress import Progress
-    from vinl.config.output import check_out, strip_command, write_json
-    from vinl.courses.courses import choose_commands
-    from vinl.courses.evaluate import check_locomotor_numbers, compare_locomotors
-    from vinl.courses.grounds import GroundConfig
-    from vinl.courses.report import draw_contacts, label_policies, print_comparison, print_figures, results_as_dict
-    from vinl.policies.io import load_policy
+    from vinl.config.output import check_out, strip_command
 
     if options.policy is not None and options.compare:
         raise InputError("--policy and --compare exclude each other; name all policies after --compare")
     names = list(options.compare) or [options.policy or "rough"]
     if len(set(names)) < len(names):
         raise InputError(f"--compare names a policy twice: {' '.join(names)}")
-    out = check_out(options.out)
-    workers = os.cpu_count() or 1 if options.workers is None else options.workers
-    check_locomotor_numbers(options.robots, options.seconds, options.seed, workers)
-    if not 0 < options.step_height <= 0.5:
-        raise InputError(f"--step-height must lie between 0 and 0.5 m, got {options.step_height:g}")
+    foreign = _COURSES if options.terrain == "bars" else {**_BARS, "video": False}
+    for name in foreign:
+        if getattr(options, name) is not None and getattr(options, name) is not False:
+            where = "is not for --terrain bars" if name in _COURSES else "is for --terrain bars alone"
+            raise InputError(f"--{name} {where}")
+    run = _run_bars if options.terrain == "bars" else _run_courses
+    run(options, names, check_out(options.out), ["vinl", "eval-loco", *strip_command(argv)])
+    return 0
+
+
+def _run_courses(options: Options, names: list[str], out: Path, command: list[str]) -> None:
+    """Random commands on any ground but bars."""
+    from rich.console import Console
+
+    from vinl.cli.progress import Progress
+    from vinl.config.output import write_json
+    from vinl.courses.courses import choose_commands
+    from vinl.courses.evaluate import check_locomotor_numbers, choose_density, compare_locomotors
+    from vinl.courses.grounds import GroundConfig
+    from vinl.courses.report import draw_contacts, label_policies, print_comparison, print_figures, results_as_dict
+
+    robots, seconds = _chosen(options, "robots"), _chosen(options, "seconds")
+    workers, density = _count_workers(options), choose_density(options.density, options.terrain)
+    check_locomotor_numbers(robots, seconds, options.seed, workers)
     choose_commands(options.commands, options.terrain)
-    GroundConfig(options.terrain, options.density, options.level, options.seed, 1.0, 1.0)  # refuses what it cannot draw
-    policies = [load_policy(name, options.device) for name in names]
-    console = Console()
+    GroundConfig(options.terrain, density, options.level, options.seed, 1.0, 1.0)  # refuses what it cannot draw
+    policies, console = _load(names, options), Console()
     with Progress(console) as progress:
         results = compare_locomotors(
             policies,
             options.terrain,
-            options.robots,
-            options.seconds,
+            robots,
+            seconds,
             options.seed,
-            options.density,
+            density,
             options.level,
             options.commands,
             workers,
             progress.show,
         )
     compared = dict(zip(label_policies(names), results, strict=True))
-    data = results_as_dict(compared, ["vinl", "eval-loco", *strip_command(argv)], workers)
-    write_json(out / "results.json", data)
-    if options.terrain == "blocks" and options.density > 0:
+    write_json(out / "results.json", results_as_dict(compared, command, workers))
+    if options.terrain == "blocks" and density > 0:
         draw_contacts(compared, out / "contacts.png")
     if options.compare:
         print_comparison(console, compared)
     else:
         print_figures(console, results[0])
-    if options.step:
-        from vinl.courses.crossing import cross_block, describe_steps, draw_steps
-        from vinl.courses.crossing_film import film_steps
-
-        ways = {name: cross_block(p, options.step_height) for name, p in zip(compared, policies, strict=True)}
-        draw_steps(ways, options.step_height, out / "step.png")
-        film_steps(ways, options.step_height, out / "step.mp4")
-        for name, crossings in ways.items():
-            console.print(f"{name}: {describe_steps(crossings)}", soft_wrap=True, highlight=False)
-        console.print(f"one block: {out / 'step.png'}, {out / 'step.mp4'}", soft_wrap=True)
     console.print(f"{results[0].wall_seconds:.0f} s; figures {out / 'results.json'}", soft_wrap=True)
-    return 0
+
+
+def _run_bars(options: Options, names: list[str], out: Path, command: list[str]) -> None:
+    """Bars across a corridor."""
+    from rich.console import Console
+
+    from vinl.cli.progress import Progress
+    from vinl.config.output import write_json
+    from vinl.courses.bars import BarConfig
+    from vinl.courses.crossing_report import crossings_as_dict, picture_crossings, print_crossings
+    from vinl.courses.evaluate_crossings import check_crossing_numbers, compare_crossings
+    from vinl.courses.report import label_policies
+
+    heights, depth, speed, crossings = (_chosen(options, name) for name in _BARS)
+    workers = _count_workers(options)
+    check_crossing_numbers(heights, crossings, options.seed, workers)
+    for height in heights:
+        BarConfig(height, depth, speed, options.seed, 1.0, 1.0)  # refuses what makes no sense
+    policies, console = _load(names, options), Console()
+    with Progress(console) as progress:
+        results = compare_crossings(
+            policies, heights, depth, speed, crossings, options.seed, options.video, workers, progress.show
+        )
+    compared = dict(zip(label_policies(names), results, strict=True))
+    write_json(out / "results.json", crossings_as_dict(compared, command, workers))
+    if options.video:
+        picture_crossings(compared, out)
+    print_crossings(console, compared)
+    console.print(f"{results[0].wall_seconds:.0f} s; figures {out / 'results.json'}", soft_wrap=True)
+
+
+def _chosen(options: Options, name: str) -> Any:
+    """An option's value, or what it is if not given."""
+    value = getattr(options, name)
+    return {**_BARS, **_COURSES}[name] if value is None else value
+
+
+def _count_workers(options: Options) -> int:
+    return os.cpu_count() or 1 if options.workers is None else options.workers
+
+
+def _load(names: list[str], options: Options) -> list[Policy]:
+    from vinl.policies.io import load_policy
+
+    return [load_policy(name, options.device) for name in names]

@@ -10,7 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, Task, T
 from rich.progress import Progress as Bar
 from rich.text import Text
 
-_TITLES = {"plan": "floor plans", "walk": "episodes", "film": "films", "robot": "robots"}
+_TITLES = {"plan": "floor plans", "walk": "episodes", "film": "films", "robot": "robots", "crossing": "crossings"}
 
 
 class TimeLeft(ProgressColumn):

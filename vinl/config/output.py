@@ -65,7 +65,7 @@ def write_json(path: Path, data: dict[str, Any]) -> None:
     """Write JSON; one episode a line, so that a person can read it and two runs can be compared line by line."""
     body = []
     for key, value in data.items():
-        if key in ("episodes", "robots") and isinstance(value, list):
+        if key in ("episodes", "robots", "crossings") and isinstance(value, list):
             rows = ",\n".join("    " + json.dumps(row, allow_nan=False) for row in value)
             body.append(f'  "{key}": [\n{rows}\n  ]')
         else:

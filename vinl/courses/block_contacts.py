@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool
 
-from vinl.chain.contacts import ContactReader
+from vinl.chain.contacts import KINDS, ContactReader
 from vinl.chain.scene import BLOCKS
 from vinl.robot.aliengo import FOOT_GEOMS, LEGS
 
@@ -16,6 +16,9 @@ HEIGHT_EDGES = (0.10, 0.12, 0.14, 0.16, 0.18, 0.20)
 """Blocks are told apart by height in these bins [m]; lower and higher ones count in the first and the last."""
 
 BINS = len(HEIGHT_EDGES) - 1
+
+_TRUNK_ON_BLOCK = KINDS.index("trunk_block")
+_WALL_KINDS = {k for k, name in enumerate(KINDS) if name.endswith("_wall")}
 
 
 def bin_heights(heights: np.ndarray) -> np.ndarray:
@@ -29,17 +32,21 @@ class BlockTouches(NamedTuple):
     Attributes:
         feet, legs: (n, 4) in the order of ``LEGS``; a leg is hip, thigh and shank.
         foot_bins, leg_bins: (n, BINS) whether any foot, any leg touched a block of the bin.
+        trunk: (n,) whether the trunk touched a block.
+        walls: (n,) whether anything touched a wall.
     """
 
     feet: Bool[np.ndarray, "n 4"]
     legs: Bool[np.ndarray, "n 4"]
     foot_bins: Bool[np.ndarray, "n bins"]
     leg_bins: Bool[np.ndarray, "n bins"]
+    trunk: Bool[np.ndarray, " n"]
+    walls: Bool[np.ndarray, " n"]
 
     @classmethod
     def none(cls, n: int) -> BlockTouches:
         """No touch."""
-        return cls(np.zeros((n, 4), bool), np.zeros((n, 4), bool), np.zeros((n, BINS), bool), np.zeros((n, BINS), bool))
+        return cls(*(np.zeros(shape, bool) for shape in ((n, 4), (n, 4), (n, BINS), (n, BINS), n, n)))
 
 
 class BlockReader(ContactReader):
@@ -54,16 +61,13 @@ class BlockReader(ContactReader):
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, out: BlockTouches, row: int) -> None:
         self._out, self._row = out, row
-        limb, leg, height = np.full(model.ngeom, -1), np.zeros(model.ngeom, int), np.full(model.ngeom, -1)
-        blocks = model.body(BLOCKS).id
-        for g in range(model.ngeom):
-            body = model.body(model.geom_bodyid[g]).name
-            if model.geom_bodyid[g] == blocks:
-                height[g] = bin_heights(2 * model.geom_size[g, 2:])[0]
-            elif model.geom(g).name in FOOT_GEOMS:
-                limb[g], leg[g] = 0, FOOT_GEOMS.index(model.geom(g).name)
-            elif body.endswith(("_hip", "_thigh", "_calf")):
-                limb[g], leg[g] = 1, LEGS.index(body.split("_")[0])
+        names = [model.body(k).name for k in range(model.nbody)]
+        is_leg = np.array([name.endswith(("_hip", "_thigh", "_calf")) for name in names])[model.geom_bodyid]
+        number = np.array([LEGS.index(name[:2]) if name[:2] in LEGS else 0 for name in names])
+        limb, leg, height = np.where(is_leg, 1, -1), number[model.geom_bodyid], np.full(model.ngeom, -1)
+        limb[[model.geom(name).id for name in FOOT_GEOMS]] = 0
+        blocks = model.geom_bodyid == model.body(BLOCKS).id
+        height[blocks] = bin_heights(2 * model.geom_size[blocks, 2])
         self._limb, self._leg, self._height = limb, leg, height
         super().__init__(model, data)
 
@@ -76,8 +80,11 @@ class BlockReader(ContactReader):
     def look(self) -> None:
         """Latch what the last physics step touched."""
         super().look()
+        if _WALL_KINDS & self.touches.keys():
+            self._out.walls[self._row] = True
         if not self._touch[0]:
             return
+        self._out.trunk[self._row] |= _TRUNK_ON_BLOCK in self.touches
         geoms = self._data.contact.geom
         limb, height = self._limb[geoms].max(1), self._height[geoms].max(1)
         for k in np.flatnonzero((limb >= 0) & (height >= 0)):

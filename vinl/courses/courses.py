@@ -12,12 +12,16 @@ from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.courses.grounds import Ground
 from vinl.policies.policy import Policy
-from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
+from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, home_qpos
+from vinl.robot.kinematics import foot_positions
+
+FOOT_CLEARANCE = 0.06
+"""In litter, no foot stands with its middle nearer to an object than this [m]."""
 
 START_CLEARANCE = 0.65
 """No robot starts with its trunk nearer than this to the middle of a block [m]: all feet then stand on the floor."""
 
-_COMMAND_LIMIT = 1.0
+_COMMAND_LIMIT, _TRIES = 1.0, 1000
 _START_STREAM, _COMMAND_STREAM = 0, 1
 
 
@@ -48,6 +52,8 @@ class CommandRanges:
 _LEVEL, _TURN = (0.0, 0.0), (-np.pi / 3, np.pi / 3)
 
 FIXED = {
+    "home": CommandRanges((0.3, 0.8), _LEVEL, (-0.6, 0.6)),
+    "steady": CommandRanges((0.4, 0.4), _LEVEL, _LEVEL),
     "turns": CommandRanges((0.3, 1.0), _LEVEL),
     "straight": CommandRanges((0.3, 1.0), _LEVEL, _LEVEL),
     "spin": CommandRanges(_LEVEL, _LEVEL, _TURN),
@@ -56,19 +62,23 @@ FIXED = {
         (0.0, 1.0), _LEVEL, _TURN, hold=(0.5, 4.0), hold_step=0.5, stand_share=0.1, turn_share=0.15
     ),
 }
-"""Commands that do not depend on the policy, by name. ``navigator``: what a navigator at 2 Hz asks for."""
+"""Commands that do not depend on the policy, by name. ``home``: how a robot walks through a home; ``navigator``: what a
+navigator at 2 Hz asks for."""
+
+DEFAULTS = {"blocks": "home", "litter": "steady", "rooms": "navigator"}
+"""The commands on each terrain; ``trained`` on all others."""
 
 COMMANDS = ("trained", "forward", *FIXED)
 """``trained``: what the policies were trained for, at most +-1 m/s and +-1 rad/s; ``forward``: without sideways."""
 
 
 def choose_commands(name: str | None, terrain: str) -> str:
-    """The commands of that name; without one ``turns`` on blocks, ``navigator`` in rooms and ``trained`` elsewhere.
+    """The commands of that name; without one those of ``DEFAULTS``.
 
     Raises:
         InputError: the name is unknown.
     """
-    name = name or {"blocks": "turns", "rooms": "navigator"}.get(terrain, "trained")
+    name = name or DEFAULTS.get(terrain, "trained")
     if name not in COMMANDS:
         raise InputError(f"--commands {name!r} is unknown{closest(name, COMMANDS)}; known: {', '.join(COMMANDS)}")
     return name
@@ -85,7 +95,7 @@ def command_ranges(name: str, policies: Sequence[Policy]) -> CommandRanges:
         low = max(-_COMMAND_LIMIT, *(float(r[0]) for r in ranges))
         high = min(_COMMAND_LIMIT, *(float(r[1]) for r in ranges))
         if low > high:
-            raise InputError(f"the policies have no {key} command in common; give --commands turns or navigator")
+            raise InputError(f"the policies have no {key} command in common; give --commands home or navigator")
         return low, high
 
     left = _LEVEL if name == "forward" else common("left")
@@ -136,8 +146,10 @@ class Course:
         """The next start: the first of the trial, then one after every fall and at the end of the ground."""
         ground, rng = self._ground, self._rng
         home = ground.homes[self.home]
+        if ground.among:
+            return self._draw_among(home)
         best, gap = home[:2], -np.inf
-        for _ in range(1000):
+        for _ in range(_TRIES):
             xy = home[:2] + rng.uniform(-ground.spread, ground.spread, 2)
             free = np.inf
             if len(ground.blocks):
@@ -148,6 +160,21 @@ class Course:
                 break
         joints = DEFAULT_POSE + rng.uniform(-0.05, 0.05, 12)
         return Start(float(best[0]), float(best[1]), float(rng.uniform(-np.pi, np.pi)), joints, float(home[2]))
+
+    def _draw_among(self, home: Float[np.ndarray, "3"]) -> Start:
+        """A start among objects, none of which is under a foot."""
+        ground, rng = self._ground, self._rng
+        pose, best = home_qpos(), -np.inf
+        x = y = yaw = 0.0
+        for _ in range(_TRIES):
+            tried = home[:2] + rng.uniform(-ground.spread, ground.spread, 2), float(rng.uniform(-np.pi, np.pi))
+            pose[:] = home_qpos(*tried[0], yaw=tried[1])
+            gap = float(ground.gap(foot_positions(np, pose[None])[0, :, :2]).min())
+            if gap > best:
+                best, (x, y), yaw = gap, tried[0].tolist(), tried[1]
+            if gap > FOOT_CLEARANCE:
+                break
+        return Start(x, y, yaw, DEFAULT_POSE + rng.uniform(-0.05, 0.05, 12), float(home[2]))
 
 
 def draw_commands(

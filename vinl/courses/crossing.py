@@ -1,147 +1,162 @@
-"""Straight over one block: where the feet go, drawn beside the block's profile."""
+"""One policy over one bar: robots walk along a corridor and over it, and every touch is counted."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vinl.chain.robot import Walker, joint_targets
-from vinl.chain.scene import build_scene
-from vinl.chain.workers import one_thread
-from vinl.courses.block_contacts import BlockReader, BlockTouches
+from vinl.chain.robot import joint_targets
+from vinl.courses.bars import BarConfig, draw_start
+from vinl.courses.block_contacts import BlockTouches
+from vinl.courses.gait_metrics import GaitRecord, record_gait
 from vinl.courses.grounds import Ground
-from vinl.courses.herd import MAX_TILT
+from vinl.courses.herd import BoxHerd
+from vinl.courses.robot_records import FRONT, REAR
 from vinl.courses.trial import sense_ground
 from vinl.policies.policy import Policy
-from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, FOOT_RADIUS, LEGS
+from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.rotation import yaw_of
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import BLOCK, flat_field, raise_boxes
 
-DEPTH, ACROSS = 0.2, 0.8
-"""The block to step over, along and across the way [m]: so wide, like two side by side, that no foot passes beside."""
+PATIENCE = 2.5
+"""A crossing has so many times the time that it takes at the commanded speed; then it is not finished."""
 
-BEGIN, END = -1.5, 1.1
-"""The trunk starts and is done at about these places [m]; the middle of the block is the origin."""
+_TO_HEADING, _TO_MIDDLE, _TURN_RATE = 1.5, 1.0, 0.5
 
-CROSSINGS = 6
-"""Robots that cross, from places up to half a stride apart: so many phases of the gait meet the block."""
 
-_STRIDE, _PATIENCE = 0.3, 2.5
-_COLOURS = ("#1f77b4", "#ff7f0e")
+@dataclass
+class CrossingRecord:
+    """One crossing, as it stands in ``results.json``. ``*_steps`` count control steps of 0.02 s in which something
+    touched the bar in any of their physics steps.
+
+    Attributes:
+        crossing: its number, from which its start follows.
+        height, depth: of the bar [m].
+        start_m: from the trunk at the start to the middle of the bar [m].
+        finished: the robot came across, without a fall.
+        fell: it ended in a fall.
+        time_s: length [s].
+        metres: way of the trunk [m].
+        foot_steps, leg_steps, trunk_steps: with any foot, any leg (hip, thigh, shank), the trunk on the bar.
+        wall_steps: with anything on a wall.
+        foot_pair_steps, leg_pair_steps: of the front and the rear ones.
+        gait: how it walked.
+    """
+
+    crossing: int
+    height: float
+    depth: float
+    start_m: float
+    finished: bool = False
+    fell: bool = False
+    time_s: float = 0.0
+    metres: float = 0.0
+    foot_steps: int = 0
+    leg_steps: int = 0
+    trunk_steps: int = 0
+    wall_steps: int = 0
+    foot_pair_steps: list[int] = field(default_factory=lambda: [0, 0])
+    leg_pair_steps: list[int] = field(default_factory=lambda: [0, 0])
+    gait: GaitRecord = field(default_factory=GaitRecord)
+
+    @property
+    def touches(self) -> int:
+        """Steps of feet, legs and trunk on the bar together: to find the best crossing by."""
+        return self.foot_steps + self.leg_steps + self.trunk_steps
+
+
+@dataclass(frozen=True, eq=False)
+class CrossingTrace:
+    """What pictures need of a crossing.
+
+    Attributes:
+        qpos: (t, 19) after every control step.
+        feet, legs: (t, 4) which of them touched the bar in the control step.
+        trunk: (t,) whether the trunk did.
+    """
+
+    qpos: Float[np.ndarray, "t 19"]
+    feet: Bool[np.ndarray, "t 4"]
+    legs: Bool[np.ndarray, "t 4"]
+    trunk: Bool[np.ndarray, " t"]
 
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """One robot's way over the block.
+    """Record and trace."""
 
-    Attributes:
-        qpos: (t, 19) at every control step.
-        feet: (t, 4, 3) middles of the feet in the order of ``LEGS`` [m].
-        foot_touches, leg_touches: (t, 4) which of them touched the block in the control step.
-        done: whether it came across without a fall.
+    record: CrossingRecord
+    trace: CrossingTrace
+
+
+def cross_bar(
+    policy: Policy,
+    config: BarConfig,
+    ground: Ground,
+    numbers: Sequence[int],
+    is_stopped: Callable[[], bool] = lambda: False,
+) -> list[Crossing]:
+    """Walk over a bar, steered along the middle of the corridor as a navigator would: by yaw rates alone.
+
+    Args:
+        policy: what drives the robots.
+        config: the bar.
+        ground: see ``build_corridor``.
+        numbers: of the crossings.
+        is_stopped: asked once a second whether to give up.
     """
-
-    qpos: Float[np.ndarray, "t 19"]
-    feet: Float[np.ndarray, "t 4 3"]
-    foot_touches: Bool[np.ndarray, "t 4"]
-    leg_touches: Bool[np.ndarray, "t 4"]
-    done: bool
-
-
-def cross_block(policy: Policy, height: float = 0.15, speed: float = 0.5, crossings: int = CROSSINGS) -> list[Crossing]:
-    """Walk over a block of a height [m] at a speed [m/s], steered back to the middle as a navigator would."""
-    block = Blocks(np.array([[0.0, 0.0, np.pi / 2, ACROSS, DEPTH, height]]))
-    field = flat_field(GridFrame(-4.0, -4.0, 0.05, (161, 161)))
-    raise_boxes(field, block.boxes(), BLOCK)
-    action = policy.card.action
-    model = build_scene(Boxes.empty(), block.boxes(), kp=float(action["kp"]), kd=float(action["kd"]))
-    ground = Ground(model, field, np.zeros((1, 3)), np.array([-1]), ["step"], np.inf, 0.0, block, Boxes.empty())
-    touches, walkers = BlockTouches.none(crossings), [Walker(model) for _ in range(crossings)]
-    feet = [model.geom(f"{leg}_foot").id for leg in LEGS]
-    for k, walker in enumerate(walkers):
-        walker.contacts = BlockReader(model, walker.data, touches, k)
-        walker.spawn(BEGIN - _STRIDE * k / crossings, 0.0, 0.0, DEFAULT_POSE)
-    steps = round(_PATIENCE * (END - BEGIN) / speed / CONTROL_DT)
-    actions, last, done = np.zeros((crossings, 12), np.float32), np.full(crossings, steps), np.zeros(crossings, bool)
+    n, starts = len(numbers), [draw_start(config, k) for k in numbers]
+    records = [
+        CrossingRecord(number, config.height, config.depth, -start.x)
+        for number, start in zip(numbers, starts, strict=True)
+    ]
+    herd, senses = BoxHerd(ground.model, n), sense_ground(policy, ground, n)
+    policy.reset(n)
+    for k, start in enumerate(starts):
+        herd.start(k, start)
+    limit = round(PATIENCE * (config.end - min(start.x for start in starts)) / config.speed / CONTROL_DT)
+    actions, alive = np.zeros((n, 12), np.float32), list(range(n))
     rows: list[tuple[np.ndarray, ...]] = []
-    with one_thread():
-        policy.reset(crossings)
-        senses = sense_ground(policy, ground, crossings)
-        for step in range(steps):
-            qpos, qvel = np.stack([w.qpos for w in walkers]), np.stack([w.qvel for w in walkers])
-            turn = np.clip(-1.5 * yaw_of(np, qpos[:, 3:7]) - 1.0 * qpos[:, 1], -0.5, 0.5)
-            command = np.stack([np.full(crossings, speed), np.zeros(crossings), turn], 1)
-            actions = senses.act(qpos, qvel, command, actions)
-            for walker, target in zip(walkers, joint_targets(actions, policy.card), strict=True):
-                walker.step(target)
-            places = np.stack([w.data.geom_xpos[feet] for w in walkers])
-            rows.append((np.stack([w.qpos for w in walkers]), places, touches.feet.copy(), touches.legs.copy()))
-            for k, walker in enumerate(walkers):
-                over, fallen = walker.qpos[0] > END, walker.has_fallen(MAX_TILT)
-                if last[k] == steps and (over or fallen):
-                    last[k], done[k] = step + 1, over and not fallen
-            if (last <= step + 1).all():
-                break
+    for step in range(limit):
+        if step % 50 == 0 and is_stopped():
+            break
+        actions = senses.act(herd.qpos, herd.qvel, steer(herd.qpos, config.speed), actions, alive)
+        before = herd.qpos[:, :2].copy()
+        herd.step(joint_targets(actions, policy.card), alive)
+        metres, touches = np.linalg.norm(herd.qpos[:, :2] - before, axis=1), herd.touches
+        rows.append((herd.qpos.copy(), touches.feet.copy(), touches.legs.copy(), touches.trunk.copy()))
+        record_gait([r.gait for r in records], herd.strain, herd.qpos, alive)
+        for k in list(alive):
+            _count(records[k], k, touches, float(metres[k]))
+            records[k].finished = bool(herd.qpos[k, 0] > config.end and not herd.fallen[k])
+            records[k].fell = bool(herd.fallen[k])
+            if records[k].finished or records[k].fell:
+                alive.remove(k)
+        if not alive:
+            break
     columns = [np.stack(column, 1) for column in zip(*rows, strict=True)]
     return [
-        Crossing(*(column[k, : last[k]] for column in columns), done=bool(done[k]))  # type: ignore[arg-type]
-        for k in range(crossings)
+        Crossing(record, CrossingTrace(*(column[k, : record.gait.steps] for column in columns)))
+        for k, record in enumerate(records)
     ]
 
 
-def describe_steps(crossings: list[Crossing]) -> str:
-    """How many crossings touched nothing, in one line."""
-    clean = sum(way.done and not way.foot_touches.any() and not way.leg_touches.any() for way in crossings)
-    feet, legs = (
-        sum(int(touches.any(1).sum()) for touches in side)
-        for side in ([way.foot_touches for way in crossings], [way.leg_touches for way in crossings])
-    )
-    fell = len(crossings) - sum(way.done for way in crossings)
-    return (
-        f"{clean} of {len(crossings)} crossings without a touch, {fell} not finished; control steps on the block: "
-        f"feet {feet}, legs {legs}"
-    )
+def steer(qpos: Float[np.ndarray, "n 19"], speed: float) -> Float[np.ndarray, "n 3"]:
+    """Commands that lead along the x axis at a speed [m/s]."""
+    turn = np.clip(-_TO_HEADING * yaw_of(np, qpos[:, 3:7]) - _TO_MIDDLE * qpos[:, 1], -_TURN_RATE, _TURN_RATE)
+    return np.stack([np.full(len(qpos), speed), np.zeros(len(qpos)), turn], 1)
 
 
-def draw_steps(ways: Mapping[str, list[Crossing]], height: float, path: Path) -> None:
-    """Height of the feet over the way, front and rear apart, one row of panels for each policy.
-
-    A line is the lowest point of a foot: the first crossing strong, the others faint. Red: it touches the block.
-    Where a foot passes beside the block there is no line.
-    """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from matplotlib.patches import Rectangle
-
-    figure = Figure(figsize=(11, 2.6 * len(ways) + 0.4), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(len(ways), 2, sharex=True, sharey=True, squeeze=False)
-    for row, (name, crossings) in zip(panels, ways.items(), strict=True):
-        for axes, pair, title in zip(row, ((0, 1), (2, 3)), ("front feet", "rear feet"), strict=True):
-            axes.add_patch(Rectangle((-DEPTH / 2, 0), DEPTH, height, color="0.75"))
-            for k, way in enumerate(crossings):
-                for foot, colour in zip(pair, _COLOURS, strict=True):
-                    x, z = way.feet[:, foot, 0], way.feet[:, foot, 2] - FOOT_RADIUS
-                    z = np.where(np.abs(way.feet[:, foot, 1]) < ACROSS / 2 + FOOT_RADIUS, z, np.nan)
-                    strength = {"linewidth": 1.8} if k == 0 else {"linewidth": 0.7, "alpha": 0.35}
-                    axes.plot(x, z, color=colour, label=LEGS[foot] if k == 0 else None, **strength)
-                    hit = way.foot_touches[:, foot]
-                    axes.plot(x[hit], z[hit], "o", color="red", markersize=3)
-            touched = sum(int(way.foot_touches[:, list(pair)].any(1).sum()) for way in crossings)
-            axes.set_title(f"{name}, {title}: {touched} steps on the block in {len(crossings)} crossings", fontsize=10)
-            axes.legend(frameon=False, loc="upper right")
-            axes.spines[["top", "right"]].set_visible(False)
-            axes.set_xlim(-0.8, 0.8)
-            axes.set_ylim(-0.02, max(0.45, height + 0.2))
-        row[0].set_ylabel("lowest point of the foot [m]")
-    for axes in panels[-1]:
-        axes.set_xlabel("way from the middle of the block [m]")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=120)
+def _count(record: CrossingRecord, row: int, touches: BlockTouches, metres: float) -> None:
+    """One control step of one robot."""
+    record.time_s = round(record.time_s + CONTROL_DT, 6)
+    record.metres += metres
+    record.foot_steps += int(touches.feet[row].any())
+    record.leg_steps += int(touches.legs[row].any())
+    record.trunk_steps += int(touches.trunk[row])
+    record.wall_steps += int(touches.walls[row])
+    for j, pair in enumerate((FRONT, REAR)):
+        record.foot_pair_steps[j] += int(touches.feet[row, pair].any())
+        record.leg_pair_steps[j] += int(touches.legs[row, pair].any())

@@ -15,7 +15,7 @@ from vinl.chain.workers import Context, Crew
 from vinl.config.errors import InputError
 from vinl.courses.block_contacts import BINS, bin_heights
 from vinl.courses.courses import CommandRanges, Course, choose_commands, command_ranges
-from vinl.courses.grounds import Ground, GroundConfig, build_ground
+from vinl.courses.grounds import DENSITY, Ground, GroundConfig, build_ground
 from vinl.courses.herd import BoxHerd
 from vinl.courses.robot_records import RobotRecord, aggregate_robots
 from vinl.courses.trial import run_trial
@@ -58,7 +58,7 @@ def evaluate_locomotor(
     robots: int = 64,
     seconds: float = 20.0,
     seed: int = 0,
-    density: float = 1.0,
+    density: float | None = None,
     level: int | None = None,
     commands: str | None = None,
     workers: int = 1,
@@ -76,7 +76,7 @@ def compare_locomotors(
     robots: int = 64,
     seconds: float = 20.0,
     seed: int = 0,
-    density: float = 1.0,
+    density: float | None = None,
     level: int | None = None,
     commands: str | None = None,
     workers: int = 1,
@@ -86,13 +86,13 @@ def compare_locomotors(
 
     Args:
         policies: the locomotors.
-        terrain: ``flat``, ``rough`` or ``blocks``.
+        terrain: one of ``grounds.TERRAINS``.
         robots: how many for each policy.
         seconds: how long [s].
         seed: of terrain, starts and commands.
-        density: blocks per m2, for ``blocks``.
+        density: blocks or objects per m2; that of ``grounds.DENSITY`` if None.
         level: level of all robots, for ``rough``; 1 to 9 by turns if None.
-        commands: one of ``courses.COMMANDS``; None: ``turns`` on blocks, ``trained`` elsewhere.
+        commands: one of ``courses.COMMANDS``; None: those of ``courses.DEFAULTS``.
         workers: processes; results do not depend on it.
         on_progress: called with ``"robot"``, robots done and robots in all.
 
@@ -100,7 +100,7 @@ def compare_locomotors(
         InputError: a number is out of range or a name unknown.
     """
     check_locomotor_numbers(robots, seconds, seed, workers)
-    chosen = choose_commands(commands, terrain)
+    chosen, density = choose_commands(commands, terrain), choose_density(density, terrain)
     for policy in policies:
         check_senses(policy)
     grounds = [
@@ -151,9 +151,14 @@ def check_locomotor_numbers(robots: int, seconds: float, seed: int, workers: int
             raise InputError(f"--{name} must lie between {low:g} and {high:g}, got {value:g}")
 
 
+def choose_density(density: float | None, terrain: str) -> float:
+    """Blocks or objects per m2: what is asked for, or what is usual on the terrain."""
+    return DENSITY.get(terrain, 1.0) if density is None else density
+
+
 def height_shares(ground: Ground) -> np.ndarray | None:
-    """(bins,) share of the blocks in every bin of height; None without blocks."""
-    if not len(ground.blocks):
+    """(bins,) share of the blocks in every bin of height; None without blocks, and for litter, which is lower."""
+    if not len(ground.blocks) or ground.among:
         return None
     return np.bincount(bin_heights(ground.blocks.rows[:, 5]), minlength=BINS) / len(ground.blocks)
 

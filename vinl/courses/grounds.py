@@ -1,12 +1,14 @@
-"""The grounds that a locomotor is tried on: level floor, the stage-1 terrains, scattered blocks, small rooms."""
+"""The grounds that a locomotor is tried on: level floor, the stage-1 terrains, blocks, litter, small rooms."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy import ndimage
 
 from vinl.chain.ground_map import GroundScan
 from vinl.chain.scene import build_scene
@@ -17,13 +19,19 @@ from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, HeightField, flat_field, raise_boxes
+from vinl.world.litter import draw_litter
 from vinl.world.mesh import box_mesh, floor_mesh, heightfield_mesh, join_meshes
 from vinl.world.terrain import TILE, Terrain, TerrainConfig, build_terrain, draw_blocks, scatter_centres
 
-TERRAINS = ("flat", "rough", "blocks", "rooms")
+TERRAINS = ("flat", "rough", "blocks", "litter", "rooms")
 
-FIELD = 12.0
-"""Half the side of the square that the blocks cover [m]."""
+FIELD, LITTER_FIELD = 12.0, 8.0
+"""Half the side of the square that blocks, that litter covers [m]."""
+
+DENSITY = {"litter": 10.0}
+"""Objects per m2 if nothing is asked for; 1 on other terrains."""
+
+_DENSEST = {"litter": 30.0}
 
 UNSEEN = 7919
 """Added to the seed of the terrain, so that it is not the one of the training."""
@@ -34,7 +42,7 @@ _ROOM_COLUMNS = 8
 _ROOM_SPREAD = 0.3
 """Half-width of the square that robots start in, in the middle room of a tile [m]: as in training."""
 
-_RESOLUTION = 0.05
+_RESOLUTION, _LITTER_RESOLUTION = 0.05, 0.025
 _HORIZON = GridFrame(-1000.0, -1000.0, 10.0, (201, 201))
 
 
@@ -43,9 +51,10 @@ class GroundConfig:
     """Which ground.
 
     Attributes:
-        terrain: ``flat``, ``rough`` (the five types of stage 1), ``blocks`` or ``rooms`` (walls close by, and blocks).
-        density: blocks per m2, for ``blocks`` and, on level 9 of them and fewer below, for ``rooms``; 0 is no block
-            under the same rules.
+        terrain: ``flat``, ``rough`` (the five types of stage 1), ``blocks``, ``litter`` (small objects, see
+            ``world.litter``) or ``rooms`` (walls close by, and blocks).
+        density: blocks or objects per m2, for ``blocks``, ``litter`` and, on level 9 of them and fewer below, for
+            ``rooms``; 0 is no block under the same rules.
         level: level of all robots, for ``rough`` and ``rooms``; spread evenly over levels 1 to 9 if None.
         seed: of the terrain.
         kp, kd: gains of the joints.
@@ -61,8 +70,11 @@ class GroundConfig:
     def __post_init__(self) -> None:
         if self.terrain not in TERRAINS:
             raise InputError(f"--terrain {self.terrain!r} is unknown; known: {', '.join(TERRAINS)}")
-        if not 0 <= self.density <= 4:
-            raise InputError(f"--density must lie between 0 and 4 blocks per m2, got {self.density:g}")
+        densest = _DENSEST.get(self.terrain, 4.0)
+        if not 0 <= self.density <= densest:
+            raise InputError(
+                f"--density must lie between 0 and {densest:g} per m2 on {self.terrain} ground, got {self.density:g}"
+            )
         if self.level is not None and not 0 <= self.level <= 9:
             raise InputError(f"--level must lie between 0 and 9, got {self.level}")
         if self.level is not None and self.terrain not in ("rough", "rooms"):
@@ -83,6 +95,7 @@ class Ground:
         spread: half-width of the square around home that robots start in [m].
         blocks: the blocks, which starts keep clear of.
         walls: what stands on the ground beside blocks.
+        among: robots start among the blocks, no foot on one; otherwise with the whole trunk off them.
     """
 
     model: mujoco.MjModel
@@ -94,6 +107,17 @@ class Ground:
     spread: float
     blocks: Blocks
     walls: Boxes
+    among: bool = False
+
+    @cached_property
+    def _block_distance(self) -> Float[np.ndarray, "rows columns"]:
+        free = self.field.labels != BLOCK
+        return np.asarray(ndimage.distance_transform_edt(free)) * self.field.frame.resolution
+
+    def gap(self, xy: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n"]:
+        """From points to the nearest cell of a block [m]."""
+        row, column = np.moveaxis(self.field.frame.cell(xy), -1, 0)
+        return self._block_distance[row, column]
 
     def on_block(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
         """Whether points [m] lie on a block, to half a cell of 5 cm."""
@@ -130,6 +154,8 @@ def build_ground(config: GroundConfig) -> Ground:
         return _build_rough(config)
     if config.terrain == "rooms":
         return _build_rooms(config)
+    if config.terrain == "litter":
+        return _build_litter(config)
     cells = round(2 * (FIELD + 2) / _RESOLUTION) + 1
     field = flat_field(GridFrame(-(FIELD + 2), -(FIELD + 2), _RESOLUTION, (cells, cells)))
     blocks = Blocks.empty()
@@ -144,6 +170,18 @@ def build_ground(config: GroundConfig) -> Ground:
     # at density 0 robots are put back as on blocks, so that both trials are alike but for the blocks
     reach = FIELD - 1 if config.terrain == "blocks" else np.inf
     return Ground(model, field, middle, none, [config.terrain], reach, FIELD * 2 / 3, blocks, Boxes.empty())
+
+
+def _build_litter(config: GroundConfig) -> Ground:
+    cells = round(2 * (LITTER_FIELD + 2) / _LITTER_RESOLUTION) + 1
+    field = flat_field(GridFrame(-(LITTER_FIELD + 2), -(LITTER_FIELD + 2), _LITTER_RESOLUTION, (cells, cells)))
+    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence([config.seed, UNSEEN])))
+    litter = draw_litter(rng, config.density, LITTER_FIELD)
+    raise_boxes(field, litter.boxes(), BLOCK)
+    model = build_scene(Boxes.empty(), litter.boxes(), kp=config.kp, kd=config.kd)
+    spread, reach = LITTER_FIELD * 2 / 3, LITTER_FIELD - 1
+    middle, none = np.zeros((1, 3)), np.array([-1])
+    return Ground(model, field, middle, none, ["litter"], reach, spread, litter, Boxes.empty(), among=True)
 
 
 def _build_rough(config: GroundConfig) -> Ground:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
 import mujoco
@@ -9,8 +10,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from vinl.chain.robot import Walker
-from vinl.courses.block_contacts import BlockReader, BlockTouches
+from vinl.courses.block_contacts import BlockTouches
 from vinl.courses.courses import Start
+from vinl.courses.strain import Strain, StrainReader
 
 MAX_TILT = 1.2566
 """A trunk tilted farther than this has fallen [rad]: 72 deg."""
@@ -31,6 +33,11 @@ class Herd(Protocol):
     touches: BlockTouches
     fallen: Bool[np.ndarray, " n"]
 
+    @property
+    def strain(self) -> Strain | None:
+        """What the last step took; None: this simulator does not tell."""
+        ...
+
     def start(self, robot: int, start: Start) -> None:
         """Put a robot somewhere, at rest."""
         ...
@@ -44,22 +51,32 @@ class BoxHerd:
     """Robots in MuJoCo C, where blocks are boxes."""
 
     def __init__(self, model: mujoco.MjModel, n: int) -> None:
-        self.touches = BlockTouches.none(n)
+        self.touches, self._strain = BlockTouches.none(n), Strain.none(n)
         self.fallen = np.zeros(n, bool)
         self.qpos, self.qvel = np.zeros((n, 19)), np.zeros((n, 18))
         self._walkers = [Walker(model) for _ in range(n)]
-        for k, walker in enumerate(self._walkers):
-            walker.contacts = BlockReader(model, walker.data, self.touches, k)
+        self._readers = [
+            StrainReader(model, w.data, self.touches, self._strain, k) for k, w in enumerate(self._walkers)
+        ]
+        for walker, reader in zip(self._walkers, self._readers, strict=True):
+            walker.contacts = reader
+
+    @property
+    def strain(self) -> Strain:
+        """What the last step took."""
+        return self._strain
 
     def start(self, robot: int, start: Start) -> None:
         """Put a robot somewhere, at rest."""
         self._walkers[robot].spawn(start.x, start.y, start.yaw, start.joints, start.ground)
         self._read(robot)
 
-    def step(self, targets: Float[np.ndarray, "n 12"]) -> None:
-        """One control step to joint targets [rad]."""
-        for k, walker in enumerate(self._walkers):
+    def step(self, targets: Float[np.ndarray, "n 12"], rows: Sequence[int] | None = None) -> None:
+        """One control step to joint targets [rad], of all robots or of those named; the others stay as they are."""
+        for k in range(len(self._walkers)) if rows is None else rows:
+            walker = self._walkers[k]
             walker.step(targets[k])
+            self._readers[k].sum_up()
             self.fallen[k] = walker.has_fallen(MAX_TILT)
             self._read(k)
 

@@ -17,6 +17,9 @@ from vinl.config.versions import describe_environment
 from vinl.courses.evaluate import LocomotorResults
 from vinl.courses.robot_records import HEIGHT_NAMES
 
+_STEPS = (("dirty_steps", "dirty %", 1), ("dirty_foot_steps", "by feet %", 1))
+"""Columns for litter, in per cent, before the others."""
+
 _COLUMNS = (
     ("foot_block_per_m", "feet/m", 2),
     ("foot_front_block_per_m", "front", 2),
@@ -28,7 +31,18 @@ _COLUMNS = (
 )
 """Figures of the table: name, title, digits."""
 
-_SPREAD = ("foot_block_per_m", "leg_block_per_m")
+_GAIT = (
+    ("cost_of_transport", "CoT", 1, 2),
+    ("leg_leg_per_m", "leg-leg/m", 1, 2),
+    ("joint_overspeed", "fast %", 100, 2),
+    ("joint_speed_peak", "peak", 1, 2),
+    ("feet_close", "close %", 100, 2),
+    ("foot_distance_min", "gap m", 1, 3),
+    ("foot_above_hip", "high %", 100, 2),
+)
+"""Figures of the gait: name, title, factor, digits."""
+
+_SPREAD = ("foot_block_per_m", "leg_block_per_m", "dirty_steps", "dirty_foot_steps")
 """Figures whose interval the table shows, as half its width."""
 
 _BARS = (
@@ -62,17 +76,32 @@ def print_comparison(console: Console, compared: Mapping[str, LocomotorResults])
     """One row for each policy."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("policy", overflow="fold", min_width=9)
-    for title in (*[title for _, title, _ in _COLUMNS], "fell"):
+    littered = all(r.config["ground"]["terrain"] == "litter" for r in compared.values())
+    columns = (*_STEPS, *_COLUMNS) if littered else _COLUMNS
+    for title in (*[title for _, title, _ in columns], "fell"):
         table.add_column(title, justify="right", no_wrap=True)
     for name, results in compared.items():
         a, cells = results.aggregate, []
-        for key, _, digits in _COLUMNS:
-            value, interval = a.get(key), a["ci95"].get(key)
-            spread = f" ±{(interval[1] - interval[0]) / 2:.{digits}f}" if interval and key in _SPREAD else ""
-            cells.append("-" if value is None else f"{value:.{digits}f}{spread}")
+        for key, _, digits in columns:
+            value, interval, factor = a.get(key), a["ci95"].get(key), 100 if key.startswith("dirty") else 1
+            spread = f" ±{factor * (interval[1] - interval[0]) / 2:.{digits}f}" if interval and key in _SPREAD else ""
+            cells.append("-" if value is None else f"{factor * value:.{digits}f}{spread}")
         table.add_row(name, *cells, f"{100 * a['falls']:.1f} %")
     console.print(table)
+    print_gait(console, {name: results.aggregate for name, results in compared.items()})
     _print_heights(console, compared)
+
+
+def print_gait(console: Console, figures: Mapping[str, Mapping[str, Any]]) -> None:
+    """How the robots walked, one row for each policy: see ``gait_metrics.aggregate_gait``."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("gait", overflow="fold", min_width=9)
+    for _, title, _, _ in _GAIT:
+        table.add_column(title, justify="right", no_wrap=True)
+    for name, own in figures.items():
+        values = [(own.get(key), factor, digits) for key, _, factor, digits in _GAIT]
+        table.add_row(name, *["-" if v is None else f"{factor * v:.{digits}f}" for v, factor, digits in values])
+    console.print(table)
 
 
 def _print_heights(console: Console, compared: Mapping[str, LocomotorResults]) -> None:

@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from vinl.chain.metrics import BOOTSTRAP, wilson_interval
 from vinl.courses.block_contacts import BINS, HEIGHT_EDGES
+from vinl.courses.gait_metrics import GaitRecord, aggregate_gait
 from vinl.robot.aliengo import CONTROL_DT
 
 FRONT, REAR = slice(0, 2), slice(2, 4)
@@ -43,6 +44,15 @@ class RobotRecord:
     leg_height_steps: list[int] = field(default_factory=lambda: [0] * BINS)
     errors: list[float] = field(default_factory=lambda: [0.0] * 4)
     """Sums of squared errors: linear, yaw rate; the same without the first second after a new command."""
+    trunk_block_steps: int = 0
+    swings: int = 0
+    """Steps of single feet, a swing and the stance after it each, see ``step_counter``."""
+    dirty_swings: int = 0
+    """Those in which the foot or its leg touched a block."""
+    dirty_foot_swings: int = 0
+    """Those in which the foot did."""
+    gait: GaitRecord = field(default_factory=GaitRecord)
+    """How the robot walked."""
 
 
 def aggregate_robots(
@@ -50,7 +60,8 @@ def aggregate_robots(
     height_shares: Float[np.ndarray, " bins"] | None = None,
     covered: float | None = None,
 ) -> dict[str, Any]:
-    """The figures of all robots. ``falls`` is the share of robots that fell at least once.
+    """The figures of all robots. ``falls`` is the share of robots that fell at least once. ``dirty_steps`` is the
+    fraction of the steps (see ``step_counter``) that touched a block. How they walked: see ``aggregate_gait``.
 
     Args:
         records: of all robots.
@@ -85,12 +96,17 @@ def aggregate_robots(
     for limb in ("foot", "leg"):
         for part in ("", "_front", "_rear"):
             add(f"{limb}{part}_block_per_m", f"{limb}{part}", "metres")
+    add("trunk_block_per_m", "trunk", "metres")
     if covered:
+        add("dirty_steps", "dirty", "swings")
+        add("dirty_foot_steps", "dirty_foot", "swings")
+        figures["steps"] = int(columns["swings"].sum())
         add("trunk_over_blocks", "over", "steps", lambda share: share / covered)
     figures["metres"] = float(columns["metres"].sum())
     levels = [r.level for r in records if r.level is not None]
     figures["mean_level"] = float(np.mean(levels)) if levels else None
     figures["robots"] = n
+    figures |= aggregate_gait([r.gait for r in records], figures["metres"])
     kinds = sorted({r.kind for r in records})
     figures["falls_by_kind"] = {k: float(np.mean([r.falls > 0 for r in records if r.kind == k])) for k in kinds}
     if height_shares is not None and figures["metres"] > 0:
@@ -101,7 +117,7 @@ def aggregate_robots(
                 for name, count, share in zip(HEIGHT_NAMES, steps, height_shares, strict=True)
             }
     figures["ci95"] = intervals
-    return _rounded(figures)
+    return round_figures(figures)
 
 
 def _columns(records: Sequence[RobotRecord]) -> dict[str, Float[np.ndarray, " n"]]:
@@ -115,6 +131,10 @@ def _columns(records: Sequence[RobotRecord]) -> dict[str, Float[np.ndarray, " n"
         ("foot", lambda r: r.foot_block_steps),
         ("leg", lambda r: r.leg_block_steps),
         ("over", lambda r: r.over_block_steps),
+        ("trunk", lambda r: r.trunk_block_steps),
+        ("swings", lambda r: r.swings),
+        ("dirty", lambda r: r.dirty_swings),
+        ("dirty_foot", lambda r: r.dirty_foot_swings),
         ("foot_front", lambda r: r.foot_pair_steps[0]),
         ("foot_rear", lambda r: r.foot_pair_steps[1]),
         ("leg_front", lambda r: r.leg_pair_steps[0]),
@@ -124,9 +144,10 @@ def _columns(records: Sequence[RobotRecord]) -> dict[str, Float[np.ndarray, " n"
     return named
 
 
-def _rounded(value: Any) -> Any:
+def round_figures(value: Any) -> Any:
+    """Plain data with all floating point numbers to six digits after the point."""
     if isinstance(value, dict):
-        return {key: _rounded(v) for key, v in value.items()}
+        return {key: round_figures(v) for key, v in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_rounded(v) for v in value]
+        return [round_figures(v) for v in value]
     return round(float(value), 6) if isinstance(value, (float, np.floating)) else value

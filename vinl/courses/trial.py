@@ -12,12 +12,17 @@ from vinl.chain.depth_cameras import Eyes
 from vinl.chain.robot import joint_targets
 from vinl.courses.block_contacts import BlockTouches
 from vinl.courses.courses import Course
+from vinl.courses.gait_metrics import record_gait
 from vinl.courses.grounds import FieldScan, Ground
 from vinl.courses.herd import Herd
 from vinl.courses.robot_records import FRONT, REAR, RobotRecord
+from vinl.courses.step_counter import StepCounter
 from vinl.policies.card import find_detour, reads_ground
 from vinl.policies.policy import Policy
 from vinl.robot.rotation import rotate_inverse
+
+LEAD = 0.5
+"""Steps count from so far from the last start on [m]: all feet then come to ground that the robot has seen."""
 
 SETTLED = 50
 """Control steps after a new command, or a new start, that the ``settled`` errors leave out."""
@@ -53,6 +58,7 @@ def run_trial(
     for k, course in enumerate(courses):
         herd.start(k, course.draw_start())
     actions, age = np.zeros((n, 12), np.float32), np.zeros(n, int)
+    begun, counter, gaits = herd.qpos[:, :2].copy(), StepCounter(n), [record.gait for record in records]
     for step in range(len(commands)):
         if step % SETTLED == 0 and is_stopped():
             break
@@ -63,15 +69,24 @@ def run_trial(
         metres = np.linalg.norm(herd.qpos[:, :2] - before, axis=1)
         _add_errors(records, herd.qpos, herd.qvel, commands[step], age >= SETTLED)
         _add_touches(records, herd.touches, metres, herd.fallen)
+        if herd.strain is not None:
+            record_gait(gaits, herd.strain, herd.qpos)
+            far = np.linalg.norm(herd.qpos[:, :2] - begun, axis=1) > LEAD
+            counter.add(herd.strain.stance, herd.touches.feet, herd.touches.legs, far)
         for k in np.flatnonzero(ground.on_block(herd.qpos[:, :2])).tolist():
             records[k].over_block_steps += 1
         age += 1
-        away = herd.fallen | (np.abs(herd.qpos[:, :2] - homes).max(1) > ground.reach)
+        fallen = herd.fallen.copy()
+        away = fallen | (np.abs(herd.qpos[:, :2] - homes).max(1) > ground.reach)
         for k in np.flatnonzero(away).tolist():
             herd.start(k, courses[k].draw_start())
-            actions[k], age[k] = 0, 0
+            actions[k], age[k], begun[k] = 0, 0, herd.qpos[k, :2]
         if away.any():
             policy.reset(away)
+            counter.restart(away, fallen)
+    for k, record in enumerate(records):
+        record.swings, record.dirty_swings = int(counter.steps[k]), int(counter.dirty[k])
+        record.dirty_foot_swings = int(counter.dirty_foot[k])
     return records
 
 
@@ -96,8 +111,9 @@ def _add_touches(
     for k, record in enumerate(records):
         record.metres += float(metres[k])
         record.falls += int(fallen[k])
-    for k in np.flatnonzero(touches.feet.any(1) | touches.legs.any(1)).tolist():
+    for k in np.flatnonzero(touches.feet.any(1) | touches.legs.any(1) | touches.trunk).tolist():
         record = records[k]
+        record.trunk_block_steps += int(touches.trunk[k])
         record.foot_block_steps += int(touches.feet[k].any())
         record.leg_block_steps += int(touches.legs[k].any())
         for j, pair in enumerate((FRONT, REAR)):

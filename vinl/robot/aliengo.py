@@ -22,6 +22,12 @@ KD = 2.0
 ACTION_SCALE = 0.25
 """Joint target = default pose + scale * action [rad] [ViNL config]."""
 
+MASS = 24.937
+"""Of the whole robot [kg] [Unitree aliengo.urdf]."""
+
+JOINT_SPEED_LIMIT = np.array([20.0, 20.0, 15.89] * 4)
+"""Fastest speed of every joint [rad/s] [Unitree aliengo.urdf]. The simulated motors do not know it."""
+
 PHYSICS_DT = 0.005
 """Physics step [s] [ViNL config]."""
 

@@ -1,0 +1,204 @@
+"""Locomotion policies over bars of several heights: many crossings each, in worker processes, and the figures."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from vinl.chain.choose import check_senses
+from vinl.chain.metrics import bootstrap_interval, wilson_interval
+from vinl.chain.workers import Context, Crew
+from vinl.config.errors import InputError
+from vinl.courses.bars import APPROACH, SPREAD, WIDTH, BarConfig, build_corridor
+from vinl.courses.crossing import PATIENCE, CrossingRecord, CrossingTrace, cross_bar
+from vinl.courses.evaluate import GROUP
+from vinl.courses.gait_metrics import aggregate_gait
+from vinl.courses.grounds import Ground
+from vinl.courses.robot_records import round_figures
+from vinl.policies.identity import describe_policy
+from vinl.policies.policy import Policy
+
+MAX_CROSSINGS, MAX_HEIGHTS = 100_000, 100
+
+TRACED = 8
+"""So many crossings of each height are kept for pictures."""
+
+_CLEAN = {
+    "clean_crossings": lambda r: not r.touches,
+    "clean_foot_crossings": lambda r: not r.foot_steps,
+    "clean_leg_crossings": lambda r: not r.leg_steps,
+    "clean_trunk_crossings": lambda r: not r.trunk_steps,
+}
+_STEPS = {
+    "foot_steps_per_crossing": lambda r: r.foot_steps,
+    "foot_front_steps_per_crossing": lambda r: r.foot_pair_steps[0],
+    "foot_rear_steps_per_crossing": lambda r: r.foot_pair_steps[1],
+    "leg_steps_per_crossing": lambda r: r.leg_steps,
+    "leg_front_steps_per_crossing": lambda r: r.leg_pair_steps[0],
+    "leg_rear_steps_per_crossing": lambda r: r.leg_pair_steps[1],
+    "trunk_steps_per_crossing": lambda r: r.trunk_steps,
+    "wall_steps_per_crossing": lambda r: r.wall_steps,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class CrossingResults:
+    """Records of one policy's crossings, the figures, and what they depend on.
+
+    Attributes:
+        records: ordered by height as asked for, then by number.
+        traces: of the first ``TRACED`` crossings of every height [m]; empty if none were asked for.
+        aggregate: figures of all crossings; those of each height in ``by_height``.
+        policies: digest of the policy's card.
+        config: everything that the run depends on.
+        wall_seconds: how long it took [s].
+    """
+
+    records: list[CrossingRecord]
+    traces: dict[float, list[CrossingTrace]]
+    aggregate: dict[str, Any]
+    policies: dict[str, Any]
+    config: dict[str, Any]
+    wall_seconds: float
+
+
+@dataclass(frozen=True)
+class _Shared:
+    policies: list[Policy]
+    traced: bool
+
+
+@dataclass(frozen=True)
+class _Job:
+    policy: int
+    bar: BarConfig
+    numbers: range
+
+
+def compare_crossings(
+    policies: Sequence[Policy],
+    heights: Sequence[float] = (0.1,),
+    depth: float = 0.2,
+    speed: float = 0.5,
+    crossings: int = 32,
+    seed: int = 0,
+    traced: bool = False,
+    workers: int = 1,
+    on_progress: Callable[[str, int, int], None] = lambda *_: None,
+) -> list[CrossingResults]:
+    """Let robots cross a bar in a corridor 1 m wide. All policies meet the same starts at every height.
+
+    Args:
+        policies: the locomotion policies.
+        heights: of the bars [m].
+        depth: of the bars, along the corridor [m].
+        speed: commanded forward speed [m/s].
+        crossings: of each policy at each height.
+        seed: of the starts.
+        traced: keep what pictures of the first ``TRACED`` crossings of every height need.
+        workers: processes; results do not depend on it.
+        on_progress: called with ``"crossing"``, crossings done and crossings in all.
+
+    Raises:
+        InputError: a number is out of range, or a policy observes what there is not.
+    """
+    check_crossing_numbers(heights, crossings, seed, workers)
+    for policy in policies:
+        check_senses(policy)
+    bars = [
+        [BarConfig(h, depth, speed, seed, float(p.card.action["kp"]), float(p.card.action["kd"])) for h in heights]
+        for p in policies
+    ]
+    began, done, total = time.perf_counter(), 0, crossings * len(heights) * len(policies)
+
+    def count() -> None:
+        nonlocal done
+        done += 1
+        on_progress("crossing", done, total)
+
+    groups = [range(first, min(first + GROUP, crossings)) for first in range(0, crossings, GROUP)]
+    jobs = [_Job(p, bar, group) for p in range(len(policies)) for bar in bars[p] for group in groups]
+    with Crew(min(workers, len(jobs)), _Shared(list(policies), traced)) as crew:
+        parts = crew.run(_run_group, jobs, count)
+    wall, results = time.perf_counter() - began, []
+    for p, policy in enumerate(policies):
+        own = [one for job, part in zip(jobs, parts, strict=True) if job.policy == p for one in part]
+        records = [record for record, _ in own]
+        config = {
+            "terrain": "bars",
+            "heights": list(heights),
+            "depth": depth,
+            "speed": speed,
+            "crossings": crossings,
+            "seed": seed,
+            "corridor": {"width": WIDTH, "approach": APPROACH, "spread": SPREAD, "patience": PATIENCE},
+            "gains": {"kp": bars[p][0].kp, "kd": bars[p][0].kd},
+        }
+        figures = aggregate_crossings(records)
+        figures["by_height"] = {f"{h:g}": aggregate_crossings([r for r in records if r.height == h]) for h in heights}
+        traces = {h: [t for record, t in own if t is not None and record.height == h] for h in heights if traced}
+        results.append(CrossingResults(records, traces, figures, {"locomotion": describe_policy(policy)}, config, wall))
+    return results
+
+
+def check_crossing_numbers(heights: Sequence[float], crossings: int, seed: int, workers: int) -> None:
+    """Refuse numbers that make no sense; ``BarConfig`` checks the bars.
+
+    Raises:
+        InputError: one of them is out of range.
+    """
+    if not 1 <= len(heights) <= MAX_HEIGHTS or len(set(heights)) < len(heights):
+        raise InputError(f"--height takes 1 to {MAX_HEIGHTS} different heights [m], got {len(heights)}")
+    for name, value, low, high in (
+        ("crossings", crossings, 1, MAX_CROSSINGS),
+        ("seed", seed, 0, 2**31 - 1),
+        ("workers", workers, 1, 1024),
+    ):
+        if not low <= value <= high:
+            raise InputError(f"--{name} must lie between {low} and {high}, got {value}")
+
+
+def aggregate_crossings(records: Sequence[CrossingRecord]) -> dict[str, Any]:
+    """The figures of a set of crossings, with 95 % intervals in ``ci95``: Wilson's for fractions, bootstrap for means.
+
+    ``finished`` and ``falls`` are fractions of the crossings. ``clean_*`` are the fractions that were finished and
+    touched the bar with nothing, with no foot, with no leg, not with the trunk. ``*_steps_per_crossing`` are means of
+    control steps. How the robots walked is in the figures of ``aggregate_gait``.
+    """
+    n = len(records)
+    figures: dict[str, Any] = {"crossings": n}
+    intervals: dict[str, list[float]] = {}
+    fractions = {"finished": lambda r: r.finished, "falls": lambda r: r.fell}
+    for name, get in _CLEAN.items():
+        fractions[name] = lambda r, get=get: r.finished and get(r)
+    for name, get in fractions.items():
+        count = sum(bool(get(r)) for r in records)
+        figures[name], intervals[name] = count / n, list(wilson_interval(count, n))
+    for name, get in _STEPS.items():
+        values = np.array([get(r) for r in records], np.float64)
+        figures[name], intervals[name] = float(values.mean()), list(bootstrap_interval(values))
+    metres = float(sum(r.metres for r in records))
+    seconds = float(sum(r.time_s for r in records))
+    figures |= {"metres": metres, "speed": metres / seconds if seconds else None}
+    figures |= aggregate_gait([r.gait for r in records], metres)
+    figures["ci95"] = intervals
+    return round_figures(figures)
+
+
+@lru_cache(maxsize=4)
+def _corridor(config: BarConfig) -> Ground:
+    return build_corridor(config)
+
+
+def _run_group(context: Context, job: _Job) -> list[tuple[CrossingRecord, CrossingTrace | None]]:
+    """Some of the crossings of one policy at one height, in lockstep. Of traces only those asked for go back."""
+    shared: _Shared = context.shared
+    done = cross_bar(shared.policies[job.policy], job.bar, _corridor(job.bar), job.numbers, context.is_stopped)
+    for _ in done:
+        context.tell()
+    return [(c.record, c.trace if shared.traced and c.record.crossing < TRACED else None) for c in done]
