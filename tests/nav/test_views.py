@@ -11,7 +11,7 @@ from vinl.nav.config import EpisodeConfig, RewardConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.robot_config import CameraConfig, ExecutionConfig, MotionConfig, ViewConfig
 from vinl.sensing.depth import DepthCamera
-from vinl.sensing.odometry import OdometryConfig
+from vinl.sensing.odometry_config import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig
 from vinl.world.mesh import floorplan_mesh
 from vinl.world.readers import load_floorplan

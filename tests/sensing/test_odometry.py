@@ -6,7 +6,8 @@ import pytest
 import torch
 
 from vinl.config.errors import InputError
-from vinl.sensing.odometry import Odometry, OdometryConfig
+from vinl.sensing.odometry import Odometry
+from vinl.sensing.odometry_config import OdometryConfig
 
 N = 4000
 

@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, field
 
 from vinl.config.errors import InputError
+from vinl.sensing.odometry_config import OdometryConfig
+from vinl.sensing.sensor_config import SensorConfig
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,8 @@ class EvaluationConfig:
         stuck_distance: ... the robot ended nearer than this to where it was [m].
         ceiling: height of a ceiling that the cameras see [m]; none by default.
         min_metres: episodes shorter than this do not count in the rates per metre [m] [paper: 1 m].
+        sensors: errors of the depth cameras of navigator and locomotor, see ``vinl.sensing.sensor_config``.
+        odometry: errors of where a learned navigator believes to be; it arrives where the goal is.
         recovery: robots of a learned navigator that have not moved or turned for 3 s back up, turn away and walk on,
             whatever it says (``vinl.chain.navigators.recovery``). The oracle always does so.
         oracle: how the shortest-path follower walks.
@@ -68,6 +72,8 @@ class EvaluationConfig:
     stuck_distance: float = 0.5
     ceiling: float | None = None
     min_metres: float = 1.0
+    sensors: SensorConfig = field(default_factory=SensorConfig)
+    odometry: OdometryConfig = field(default_factory=OdometryConfig)
     recovery: bool = True
     oracle: OracleConfig = field(default_factory=OracleConfig)
 

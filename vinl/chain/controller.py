@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from vinl.chain.depth_cameras import Eyes, open_eyes
 from vinl.chain.ground_map import GroundScan
+from vinl.chain.real_cameras import CameraErrors, RealCameras
 from vinl.config.errors import InputError
 from vinl.policies.card import find_detour, reads_ground
 from vinl.policies.policy import Policy
@@ -30,7 +31,7 @@ class Senses:
         eyes: renders depth; needed only by a policy with a camera.
     """
 
-    def __init__(self, locomotor: Policy, scan: GroundScan | None, eyes: Eyes | None) -> None:
+    def __init__(self, locomotor: Policy, scan: GroundScan | None, eyes: Eyes | RealCameras | None) -> None:
         self._locomotor, self._scan, self._eyes = locomotor, scan, eyes
         self._size = locomotor.card.observation_size
 
@@ -54,11 +55,18 @@ class Senses:
         return check_actions(answer, len(qpos), self._locomotor)
 
 
-def give_senses(locomotor: Policy, plan: FloorPlan, blocks: Sequence[Blocks], ceiling: float | None = None) -> Senses:
-    """The senses of robots in a floor plan, each with its own clutter, see ``open_eyes``."""
+def give_senses(
+    locomotor: Policy,
+    plan: FloorPlan,
+    blocks: Sequence[Blocks],
+    ceiling: float | None = None,
+    errors: CameraErrors | None = None,
+) -> Senses:
+    """The senses of robots in a floor plan, each with its own clutter, see ``open_eyes``; ``errors`` are those of their
+    cameras."""
     scan = GroundScan(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
     eyes = None if locomotor.camera is None else open_eyes(plan, blocks, locomotor.camera, ceiling)
-    return Senses(locomotor, scan, eyes)
+    return Senses(locomotor, scan, eyes if eyes is None or errors is None else errors.put_on(eyes))
 
 
 def check_actions(actions: np.ndarray, n: int, locomotor: Policy) -> np.ndarray:

@@ -56,9 +56,14 @@ class Eyes:
         """
         chosen = list(range(len(self._worlds)) if rows is None else rows)
         if chosen:
-            render = self._prepare(len(chosen))
-            self._images[torch.as_tensor(chosen)] = render(self._worlds[chosen], *self._place(qpos[chosen]))
+            self._images[torch.as_tensor(chosen)] = self.render(chosen, *self.place(qpos[chosen]))
         return self._images
+
+    def render(
+        self, chosen: Sequence[int], position: Float[np.ndarray, "k 3"], rotation: Float[np.ndarray, "k 3 3"]
+    ) -> Float[torch.Tensor, "k height width"]:
+        """Depth [m] that the cameras of the chosen robots see from given poses; overwritten by the next call."""
+        return self._prepare(len(chosen))(self._worlds[list(chosen)], position, rotation)
 
     def _prepare(self, n: int) -> PreparedRender:
         """The launch for so many robots, made when so many look for the first time."""
@@ -66,7 +71,7 @@ class Eyes:
             self._renders[n] = PreparedRender(self._depth, n)
         return self._renders[n]
 
-    def _place(self, qpos: Float[np.ndarray, "n 19"]) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3 3"]]:
+    def place(self, qpos: Float[np.ndarray, "n 19"]) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3 3"]]:
         """Position and orientation of the cameras. Written out, not as matrix products: a library's product may round
         otherwise for another number of robots, and an image must depend on its own robot alone."""
         trunk = matrix_of(np, qpos[:, 3:7])

@@ -15,7 +15,7 @@ from vinl.world.clutter import ClutterPreset, scatter_blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.start_goal import StartGoal, sample_start_goals
 
-_START_GOALS, _CLUTTER, _START = range(3)
+_START_GOALS, _CLUTTER, _START, _SENSORS = range(4)
 
 
 def make_rng(purpose: int, plan: str, *numbers: int) -> np.random.Generator:
@@ -61,6 +61,11 @@ def draw_setup(
     ends = np.stack([route.start, route.goal])
     blocks = scatter_blocks(plan, clutter, make_rng(_CLUTTER, plan.name, seed, episode), ends)
     return EpisodeSetup(plan.name, episode, seed, route, yaw, joints, blocks)
+
+
+def sensor_key(setup: EpisodeSetup) -> int:
+    """The number below 2^31 that the errors of an episode's cameras and odometry follow from."""
+    return int(make_rng(_SENSORS, setup.plan, setup.seed, setup.episode).integers(2**31))
 
 
 def draw_setups(

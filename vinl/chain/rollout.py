@@ -10,9 +10,11 @@ from jaxtyping import Float
 from vinl.chain.batching import ask_only, batch_navigator, batch_policy
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.controller import give_senses
+from vinl.chain.dead_reckoning import DeadReckoning
 from vinl.chain.depth_cameras import open_eyes
-from vinl.chain.episode import EpisodeSetup
+from vinl.chain.episode import EpisodeSetup, sensor_key
 from vinl.chain.navigators.base import Navigator, Task, check_choice
+from vinl.chain.real_cameras import CameraErrors
 from vinl.chain.recorder import Tally
 from vinl.chain.records import Episode
 from vinl.chain.robot import Walker, joint_targets
@@ -73,8 +75,13 @@ def run_episodes(
     navigator.reset([Task(space, setup.route) for setup in setups])
     walkers = _spawn_walkers(plan, setups, locomotor)
     blocks = [setup.blocks for setup in setups]
-    senses = give_senses(locomotor, plan, blocks, config.ceiling)
+    keys = [sensor_key(setup) for setup in setups]
+    sensors = None if config.sensors.is_ideal else CameraErrors(config.sensors, keys)
+    senses = give_senses(locomotor, plan, blocks, config.ceiling, sensors)
     eyes = None if navigator.camera is None else open_eyes(plan, blocks, navigator.camera, config.ceiling)
+    if eyes is not None and sensors is not None:
+        eyes = sensors.put_on(eyes)
+    reckoning = None if config.odometry.is_exact else DeadReckoning(config.odometry, keys)
     goals = np.stack([setup.route.goal for setup in setups])
     tallies = [Tally(setup, space, config, film=k in filmed) for k, setup in enumerate(setups)]
     command, choice, actions = np.zeros((n, 3)), np.zeros((n, 2)), np.zeros((n, 12), np.float32)
@@ -83,11 +90,15 @@ def run_episodes(
     qpos, qvel = np.stack([w.qpos for w in walkers]), np.stack([w.qvel for w in walkers])
     limit = round(config.time_limit / CONTROL_DT)
     for step in range(limit):
+        if sensors is not None:
+            sensors.note(qpos)
         if step % config.navigation_period == 0:
             if is_stopped():
                 raise InterruptedRunError
             pose = np.column_stack([qpos[:, :2], yaw_of(np, qpos[:, 3:7])])
-            seen = {"goal": goal_in_heading_frame(pose, goals), "previous_action": choice, "pose": pose}
+            believed = pose if reckoning is None else reckoning.follow(pose)
+            seen = {"goal": goal_in_heading_frame(believed, goals), "previous_action": choice, "pose": believed}
+            seen["true_pose"] = pose
             if eyes is not None:
                 seen["depth"] = eyes.look(qpos, alive)
             choice = check_choice(navigator.act(seen), n, navigator)

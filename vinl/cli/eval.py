@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from vinl.benchmark.protocol import Protocol
     from vinl.benchmark.work import Row
+    from vinl.chain.config import EvaluationConfig
     from vinl.cli.progress import Progress
 
 
@@ -73,6 +74,13 @@ class Options:
     """Metres per pixel of floor plans that are bare pictures; 0.05 if not given."""
     min_speck: int = 0
     """Pieces of wall of fewer pixels than this are dropped from pictures and ROS maps."""
+    sensors: str | None = None
+    """Errors of the depth cameras: ideal (none, the default), realistic (a stereo camera: noise, holes, delay, a mount
+    that is a little off), or a YAML file like configs/sensors/realistic.yaml."""
+    drift: float | None = None
+    """A learned navigator knows where it is from its own motion alone, and measures distances too long or too short by
+    this fraction (0.02: 2 %; default: 0); its heading drifts too, by up to 0.1 rad times this a metre. It arrives where
+    the goal is."""
     config: str = "eval/default"
     """Rules of the episodes: a shipped config or a YAML file."""
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="KEY=VALUE")] = ()
@@ -87,8 +95,6 @@ def main(argv: list[str]) -> int:
     from vinl.benchmark.protocol import Films, Protocol
     from vinl.benchmark.routes import read_routes
     from vinl.benchmark.shard import Shard
-    from vinl.chain.config import EvaluationConfig
-    from vinl.config.loader import load_config
     from vinl.config.output import check_out, strip_command
     from vinl.world.readers import load_floorplans
 
@@ -98,7 +104,7 @@ def main(argv: list[str]) -> int:
     check_numbers(options.episodes, options.seeds, options.first_seed, options.obstacles or "none", workers)
     check_folder(out, options.table)
     shard = Shard.parse(options.shard)
-    config = load_config(EvaluationConfig, options.config, options.set)
+    config = _load_rules(options)
 
     def prepare() -> Protocol:
         plans = load_floorplans(options.floorplans, options.resolution, options.min_speck)
@@ -169,13 +175,24 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], wor
 
 def _load_row(loco: str, nav: str, obstacles: str, options: Options) -> Row:
     from vinl.benchmark.work import Row
-    from vinl.chain.config import EvaluationConfig
     from vinl.chain.navigators.choose import load_navigator
-    from vinl.config.loader import load_config
     from vinl.policies.io import load_policy
 
-    config = load_config(EvaluationConfig, options.config, options.set)
+    config = _load_rules(options)
     return Row(load_policy(loco, options.device), load_navigator(nav, config, options.device), obstacles)
+
+
+def _load_rules(options: Options) -> EvaluationConfig:
+    from vinl.chain.config import EvaluationConfig
+    from vinl.config.loader import load_config
+
+    errors = []
+    if options.sensors is not None:
+        name = options.sensors
+        errors.append(f"sensors={name if name.endswith(('.yaml', '.yml')) else f'sensors/{name}'}")
+    if options.drift is not None:
+        errors.append(f"odometry.drift=[{options.drift},{options.drift}]")
+    return load_config(EvaluationConfig, options.config, [*errors, *options.set])
 
 
 def _progress(console: Console, out: Path) -> Progress:

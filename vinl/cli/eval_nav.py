@@ -22,8 +22,8 @@ class Options:
     """Floor plans beside the generated homes; FILE:50-99 are plans 50 to 99 of a JSON file, FILE:50- those from 50 on,
     FILE:0-/2 every second."""
     sets: tuple[str, ...] = ()
-    """Floors that are kept for judging: offices (20 office floors), dead_ends (20 homes most of whose rooms have one
-    door)."""
+    """Floors that are kept for judging: offices (20 office floors), dead_ends (20 homes whose rooms and doors make a
+    tree)."""
     homes: int | None = None
     """Generated homes; 200 by default, none where --floorplans or --sets is given."""
     homes_seed: int = 1_000_000_000

@@ -10,7 +10,7 @@ from vinl.nav.limits import Range, check_number, check_range
 from vinl.nav.ppo_config import NetworkConfig, PpoConfig
 from vinl.nav.robot_config import CameraConfig, ExecutionConfig, MotionConfig, RobotConfig, ViewConfig
 from vinl.policies.card import PREVIOUS
-from vinl.sensing.odometry import OdometryConfig
+from vinl.sensing.odometry_config import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig
 from vinl.world.homes.config import HomeConfig, layout_config
 

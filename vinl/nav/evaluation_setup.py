@@ -18,7 +18,7 @@ from vinl.policies.card import PolicyCard, find_previous
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.policies.velocity_range import VelocityRange
-from vinl.sensing.odometry import OdometryConfig
+from vinl.sensing.odometry_config import OdometryConfig
 from vinl.sensing.sensor_config import load_sensors
 from vinl.world.homes.judging import find_judging_set
 from vinl.world.readers import expand_paths, shipped_floorplans

@@ -44,7 +44,8 @@ class Navigator(Protocol):
         Args:
             observation: ``goal`` (n, 3): straight distance [m], cosine and sine of the bearing in the robot's heading
                 frame, left positive; ``previous_action`` (n, 2): what this returned last, zero at first; ``pose``
-                (n, 3): x, y [m] and yaw [rad], for oracles, and for odometry: how far it moved since the last decision;
+                (n, 3): x, y [m] and yaw [rad] where it believes to be, for odometry: how far it moved since the last
+                decision; ``true_pose`` (n, 3) where it is, for oracles;
                 ``depth`` (n, height, width) [m], if the navigator has a camera: a torch tensor that the next step
                 overwrites. Rows of episodes that are over stay, with their last values.
         """

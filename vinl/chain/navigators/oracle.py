@@ -41,8 +41,8 @@ class OracleNavigator:
         self._recovery = Recovery(len(self._tasks), self.config.speed, self.config.turn_rate)
 
     def act(self, observation: dict[str, Any]) -> Float[np.ndarray, "n 2"]:
-        """See ``Navigator.act``; reads ``pose``."""
-        pose = np.asarray(observation["pose"], dtype=np.float64)
+        """See ``Navigator.act``; reads ``true_pose``, or ``pose`` where there is no other."""
+        pose = np.asarray(observation.get("true_pose", observation["pose"]), dtype=np.float64)
         target, left, ease = np.empty((len(pose), 2)), np.empty(len(pose)), np.empty(len(pose))
         for k in range(len(pose)):
             target[k], left[k], ease[k] = self._aim(k, pose[k, :2])

@@ -38,7 +38,7 @@ JUDGING_SETS = {
     "offices": JudgingSet("office", 2_000_000_000),
     "dead_ends": JudgingSet("dead_ends", 2_100_000_000),
 }
-"""20 office floors, and 20 homes most of whose rooms have one door."""
+"""20 office floors, and 20 homes whose rooms and doors make a tree."""
 
 
 def find_judging_set(name: str) -> JudgingSet:
