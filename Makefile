@@ -1,6 +1,7 @@
 # make demo    two homes, a few episodes, a video: about three minutes on two cores
 # make test    all tests
 # make fuzz    damaged files to everything that reads files: three minutes
+# make release an sdist and a wheel in dist, tried in an empty environment: about five minutes
 # make check   formatting, lint, types, the direction of imports
 # make clean   remove the environment and everything that was made
 # Each makes .venv when it is missing. PYTHON picks the interpreter (3.11 or newer).
@@ -9,7 +10,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= runs/demo
 
-.PHONY: demo test fuzz check format clean install install-dev
+.PHONY: demo test fuzz release check format clean install install-dev
 .DELETE_ON_ERROR:
 
 demo: install
@@ -23,6 +24,12 @@ test: install-dev
 
 fuzz: install-dev
 	$(BIN)/python tests/fuzz/fuzz.py
+
+# The wheel is built from the sdist, so that both are tried.
+release: install-dev
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist .
+	VINL_DIST=dist $(BIN)/python -m pytest tests/packaging -p no:cacheprovider
 
 check: install-dev
 	$(BIN)/ruff format --check .
@@ -51,7 +58,7 @@ install-dev: .venv/.full
 	touch $@
 
 .venv/.full: pyproject.toml | .venv/.torch
-	$(BIN)/pip install --quiet -e ".[train,dev]"
+	$(BIN)/pip install --quiet -e ".[train,export,dev]"
 	touch $@ .venv/.light
 
 clean:

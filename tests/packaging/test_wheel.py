@@ -1,9 +1,13 @@
-"""The wheel carries all that evaluating needs, and runs in an empty environment without the training libraries."""
+"""The wheel carries all that evaluating needs, and runs in an empty environment without the training libraries.
+
+It is built from the sdist, as whoever installs from the sdist does; ``make release`` has it tried on what it has built.
+"""
 
 import json
 import os
 import subprocess
 import sys
+import tarfile
 import venv
 import zipfile
 from pathlib import Path
@@ -15,12 +19,36 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("wheel")
-    command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(out), str(ROOT)]
+def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder with both."""
+    if "VINL_DIST" in os.environ:
+        return ROOT / os.environ["VINL_DIST"]
+    out = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(out), str(ROOT)]
     subprocess.run(command, check=True, capture_output=True)
-    (built,) = out.glob("vinl-*.whl")
+    return out
+
+
+@pytest.fixture(scope="module")
+def wheel(dist: Path) -> Path:
+    (built,) = dist.glob("vinl-*.whl")
     return built
+
+
+def test_sdist_carries_the_sources(dist: Path):
+    (built,) = dist.glob("vinl-*.tar.gz")
+    with tarfile.open(built) as archive:
+        inside = {name.split("/", 1)[1] for name in archive.getnames() if "/" in name}
+    assert {
+        "pyproject.toml",
+        "README.md",
+        "LICENSE",
+        "Makefile",
+        "vinl/cli/app.py",
+        "configs/nav/default.yaml",
+    } <= inside
+    assert {"assets/policies/rough/policy.safetensors", "examples/deploy/walk_home.py", "docs/deploy.md"} <= inside
+    assert not [name for name in inside if name.split("/")[0] in (".venv", "runs", "dist", ".git")]
 
 
 def test_wheel_carries_configs_assets_and_weights(wheel: Path):
@@ -63,6 +91,12 @@ def test_training_says_what_to_install(environment: Path):
     assert done.returncode == 2 and done.stderr.count("\n") == 1
     assert 'pip install "vinl[train]"' in done.stderr
     assert not Path("runs").exists()
+
+
+def test_export_says_what_to_install(environment: Path):
+    done = run(environment, "export", "loco")
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert 'pip install "vinl[export]"' in done.stderr
 
 
 def test_doctor_is_content(environment: Path):

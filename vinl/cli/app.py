@@ -19,6 +19,7 @@ COMMANDS = {
     "train-nav": ("vinl.cli.train_nav", "train a navigator (needs the train extra)"),
     "plans": ("vinl.cli.plans", "list the shipped floor plans, draw a floor plan"),
     "policies": ("vinl.cli.policies", "the trained policies that come with vinl, and their measured figures"),
+    "export": ("vinl.cli.export", "a policy as an ONNX file for a robot, checked in MuJoCo C; a home as MJCF"),
     "bench": ("vinl.cli.bench", "how fast training physics and the depth camera run here"),
     "doctor": ("vinl.cli.doctor", "versions, devices, and a one-second check of each part"),
 }

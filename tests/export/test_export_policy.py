@@ -1,0 +1,197 @@
+"""Every shipped policy, and that of a run folder, becomes a file that answers as the policy does."""
+
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+import torch
+from torch import Tensor
+
+from vinl.cli.app import main
+from vinl.config.errors import InputError
+from vinl.export import extra, policy
+from vinl.export.frames import explain_rows
+from vinl.export.onnx_file import build_model, read_metadata
+from vinl.export.parity import LIMIT, ExportedPolicy
+from vinl.export.policy import Exported, ParityError, export_policy
+from vinl.policies.card import locomotion_card
+from vinl.policies.depth_actor import DepthActor
+from vinl.policies.depth_policy import DepthPolicy, State
+from vinl.policies.identity import digest_weights
+from vinl.policies.io import list_policies, load_policy, save_policy
+from vinl.policies.networks import PolicyNetwork
+from vinl.robot.aliengo import DEFAULT_POSE, JOINTS
+from vinl.robot.cameras import LOCOMOTION_CAMERA
+
+OTHERS = sorted({*list_policies()} - {"loco", "nav"})
+
+
+def check(path: Path, done: Exported, name: str, steps: int):
+    parity, about = done.parity, ExportedPolicy(path).about
+    assert parity.steps == steps and parity.worst <= LIMIT < parity.largest
+    card = load_policy(name).card
+    assert (about["kind"], about["name"]) == (card.kind, card.name) and card.name in done.title
+    assert about["weights_sha256"] == done.weights == digest_weights(load_policy(name).network)
+    assert [row["name"] for row in about["observation"]] == [row["name"] for row in card.observation]
+    assert all(row["meaning"] and row["scale"] and row["unit"] for row in about["observation"])
+    assert done.inputs["observation"] == (1, card.observation_size)
+    assert ("camera" in about) == ("depth" in done.inputs) == (load_policy(name).camera is not None)
+    assert done.outputs["action"] == (1, 12 if card.kind == "locomotion" else 2)
+    assert [state["input"] for state in about["states"]] == [
+        n for n in done.inputs if n not in ("observation", "depth")
+    ]
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_shipped_policies(name: str):
+    steps = 100 if load_policy(name).card.kind == "locomotion" else 40
+    check(Path("a.onnx"), export_policy(name, "a.onnx", steps), name, steps)
+
+
+def test_loco(exported: dict[str, tuple[Path, Exported]]):
+    path, done = exported["loco"]
+    check(path, done, "loco", 100)
+    about, policy = ExportedPolicy(path).about, load_policy("loco")
+    assert policy.camera is not None
+    assert about["joint_names"] == list(JOINTS) and about["default_pose"] == DEFAULT_POSE.tolist()
+    assert (about["kp"], about["kd"], about["action_scale"], about["period"]) == (40.0, 2.0, 0.25, 0.02)
+    camera = about["camera"]
+    assert {key: camera[key] for key in policy.camera.describe()} == policy.camera.describe() | {
+        "position": list(policy.camera.position)
+    }
+    np.testing.assert_allclose(camera["rotation"], policy.camera.rotation())
+    assert about["image_preparation"]["missing"] == "give pixels without a return as the far limit"
+
+
+def test_nav(exported: dict[str, tuple[Path, Exported]]):
+    path, done = exported["nav"]
+    check(path, done, "nav", 40)
+    about = ExportedPolicy(path).about
+    assert about["forward_speed"] == [0.0, 0.8] and about["period"] == 0.5
+    assert about["camera"]["name"] == "navigation"
+
+
+def test_file_is_sound_and_names_no_file_of_this_machine(exported: dict[str, tuple[Path, Exported]]):
+    path, _ = exported["loco"]
+    onnx.checker.check_model(path, full_check=True)
+    content = path.read_bytes()
+    for trace in (b".py", b"site-packages", b"stack_trace", str(Path.home()).encode() + b"/"):
+        assert trace not in content
+
+
+def make_run(folder: Path, seed: int = 0) -> Path:
+    """What a stage 3 training leaves, before it learned anything."""
+    torch.manual_seed(seed)
+    network = DepthActor(hidden=32, layers=1, actor=(32,))
+    camera = LOCOMOTION_CAMERA.describe()
+    card = locomotion_card("mine", network.describe(), scan=False, camera=camera, training={"stage": 3})
+    save_policy(folder / "policy", network, card)
+    (folder / "metrics.jsonl").write_text("")
+    return folder
+
+
+def test_run_folder(capsys: pytest.CaptureFixture[str]):
+    run = make_run(Path("runs/mine"))
+    assert main(["export", str(run), "--steps", "60"]) == 0
+    said, path = capsys.readouterr().out, Path("mine.onnx")
+    assert "locomotion policy mine" in said and "60 steps of" in said and "ms a step" in said
+    assert "hidden (1, 1, 32)" in said and "hidden_next (1, 1, 32)" in said
+    network = load_policy(run)
+    observation, depth = np.full((1, 48), 0.1, np.float32), np.full((1, 36, 64), 0.7, np.float32)
+    file = ExportedPolicy(path)
+    for _ in range(3):
+        np.testing.assert_allclose(file.act(observation[0], depth[0]), network.act(observation, depth)[0], atol=1e-5)
+
+
+def test_a_file_that_answers_otherwise_is_not_written(monkeypatch: pytest.MonkeyPatch, capsys):
+    def build_another(loaded: DepthPolicy):
+        return build_model(load_policy(make_run(Path("runs/other"), seed=1)))
+
+    monkeypatch.setattr(policy, "build_model", build_another)
+    run = make_run(Path("runs/mine"))
+    with pytest.raises(ParityError, match="differ from those of mine by"):
+        export_policy(run, "mine.onnx", 10)
+    assert main(["export", str(run), "--steps", "10"]) == 1
+    assert "nothing was written" in capsys.readouterr().out
+    assert {path.name for path in Path().iterdir()} == {"runs"}
+
+
+class ClockedActor(PolicyNetwork):
+    """A toy whose memory is the phase of a gait."""
+
+    image = None
+    state_names = ("gait_phase",)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.arguments, self.observation_size, self.action_size = {}, 48, 12
+        self.layer = torch.nn.Linear(48, 12)
+
+    def initial_state(self, n: int, device: torch.device | str | None = None) -> State:
+        return (torch.full((1, n, 1), 0.95, device=device),)
+
+    def forward(self, depth: object, vector: Tensor, state: State, fresh: Tensor) -> tuple[Tensor, State]:
+        phase = torch.where(fresh[..., None], torch.full_like(state[0], 0.95), state[0])
+        return self.layer(vector) + torch.sin(2 * torch.pi * phase), ((phase + 0.1) % 1.0,)
+
+
+def test_a_gait_clock_is_an_input_and_an_output():
+    torch.manual_seed(0)
+    network = ClockedActor()
+    loaded = DepthPolicy(network, locomotion_card("clocked", network.describe(), scan=False))
+    Path("clock.onnx").write_bytes(build_model(loaded).SerializeToString())
+    file = ExportedPolicy("clock.onnx")
+    assert file.about["states"] == [
+        {"input": "gait_phase", "output": "gait_phase_next", "shape": [1, 1, 1], "start": pytest.approx(0.95)}
+    ]
+    observations = np.random.default_rng(0).normal(size=(12, 48)).astype(np.float32)
+    for observation in observations:
+        np.testing.assert_allclose(file.act(observation), loaded.act(observation[None])[0], atol=1e-5)
+    assert not np.allclose(file.act(observations[0]), file.act(observations[0]))
+
+
+def test_rows_explain_themselves():
+    assert explain_rows([{"name": "x", "size": 3, "meaning": "mine"}]) == [{"name": "x", "size": 3, "meaning": "mine"}]
+    with pytest.raises(InputError, match="'projected_gravty' means, did you mean 'projected_gravity'"):
+        explain_rows([{"name": "projected_gravty", "size": 3}])
+    table = read_metadata({"observation": "[]"})
+    assert table == {"observation": []}
+
+
+def test_height_scans_come_with_their_points():
+    rows = explain_rows(load_policy("teacher").card.observation)
+    assert rows[-1]["name"] == "height_scan" and np.shape(rows[-1]["points_m"]) == (187, 2)
+    assert not any("points_m" in row for row in rows[:-1])
+
+
+@pytest.mark.parametrize(
+    ("argv", "says"),
+    [
+        ("export", "give a policy"),
+        ("export loco --scene harbour_flat", "give a policy"),
+        ("export lco", "did you mean 'loco'"),
+        ("export loco --out loco.pt", "must end with .onnx"),
+        ("export loco --out folder.onnx", "is a folder"),
+        ("export loco --out file/loco.onnx", "cannot write file/loco.onnx"),
+        ("export loco --steps 0", "steps must be at least 1"),
+        ("export --scene harbour_flt --out home", "shipped plans"),
+        ("export --scene harbour_flat --out file/home", "cannot write file/home"),
+        ("export --scene harbour_flat --out home --obstacles some", "unknown obstacles 'some'"),
+        ("export --scene harbour_flat --out home --episodes 0", "episodes must be at least 1"),
+        ("export --scene harbour_flat --out home --seed -1", "seed must not be negative"),
+    ],
+)
+def test_bad_input_is_one_line(argv: str, says: str, capsys: pytest.CaptureFixture[str]):
+    Path("file").write_text("")
+    Path("folder.onnx").mkdir()
+    assert main(argv.split()) == 2
+    said = capsys.readouterr()
+    assert said.err.count("\n") == 1 and says in said.err and not said.out
+    assert {path.name for path in Path().iterdir()} == {"file", "folder.onnx"}
+
+
+def test_without_the_extra(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    monkeypatch.setattr(extra, "find_spec", lambda name: None if name == "onnxruntime" else object())
+    assert main(["export", "loco"]) == 2
+    assert capsys.readouterr().err == 'error: export needs onnxruntime; install it: pip install "vinl[export]"\n'

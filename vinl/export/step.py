@@ -1,0 +1,97 @@
+"""One control step of one robot as a function of tensors alone: what a policy remembers goes in and comes out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import torch
+from torch import Tensor, nn
+
+from vinl.config.errors import InputError
+from vinl.policies.depth_policy import DepthNetwork, DepthPolicy
+from vinl.policies.policy import LocomotionPolicy
+from vinl.sensing.preparation import prepare_depth
+
+OBSERVATION, DEPTH, ACTION = "observation", "depth", "action"
+"""Names of the inputs and the output that are not memory."""
+
+MEMORY = ("hidden", "cell")
+"""Names of what an LSTM remembers."""
+
+NEXT = "_next"
+"""The output that is to be given back as the input ``hidden`` is called ``hidden_next``."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """What a policy remembers from step to step, an input and an output of the file.
+
+    Attributes:
+        name: of the input; the output's ends with ``NEXT``.
+        start: its value when an episode begins, with the shape that it has for one robot.
+    """
+
+    name: str
+    start: Tensor
+
+
+class Step(nn.Module):
+    """A policy's network for one robot: image preparation inside, memory outside.
+
+    A network that remembers more than an LSTM does, such as the phase of its gait, lists it in ``state_names`` in the
+    order of its ``initial_state``; it then becomes inputs and outputs like any memory.
+
+    Args:
+        policy: as ``load_policy`` gives it.
+
+    Attributes:
+        states: what it remembers; empty for a policy without memory.
+        camera: whose depth it takes; None for one that sees none.
+
+    Raises:
+        InputError: the network remembers something that has no name.
+    """
+
+    def __init__(self, policy: LocomotionPolicy | DepthPolicy) -> None:
+        super().__init__()
+        self.network = policy.network
+        self.states: tuple[State, ...] = ()
+        self.camera = policy.camera
+        self._sees = isinstance(policy, DepthPolicy)
+        if not self._sees:
+            return
+        network = cast(DepthNetwork, policy.network)
+        start = network.initial_state(1, policy.device)
+        names = getattr(network, "state_names", MEMORY[: len(start)])
+        if len(names) != len(start):
+            raise InputError(f"{policy.card.name} remembers {len(start)} things, of which {len(names)} have a name")
+        self.states = tuple(State(*pair) for pair in zip(names, start, strict=True))
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs in their order."""
+        return (OBSERVATION, *((DEPTH,) if self.camera else ()), *(state.name for state in self.states))
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs in their order."""
+        return (ACTION, *(state.name + NEXT for state in self.states))
+
+    def example(self) -> tuple[Tensor, ...]:
+        """Inputs of the right shapes, for the tracer."""
+        observation = torch.zeros(1, self.network.observation_size)
+        depth = (torch.ones(1, self.camera.height, self.camera.width),) if self.camera else ()
+        return (observation, *depth, *(state.start for state in self.states))
+
+    def forward(self, observation: Any, *rest: Any) -> tuple[Any, ...]:
+        """The action (1, a) and the states after it, from the observation (1, k), depth (1, height, width) [m] if the
+        policy sees, and the states before."""
+        if not self._sees:
+            return (self.network(observation),)
+        image, states = observation[:, :1, None], rest
+        if self.camera is not None:
+            image, states = prepare_depth(self.camera, rest[0]), rest[1:]
+        fresh = torch.zeros(1, 1, dtype=torch.bool)  # who begins an episode gives the states of the start
+        action, after = self.network(image[None], observation[None], states, fresh)
+        return (action[0], *after)
