@@ -72,7 +72,7 @@ def test_stage_2_the_same_and_play_shows_what_went_wrong(tmp_path, monkeypatch, 
     check_run(run, ["--stage", "2", "--from", "rough", *STAGE2], capsys)
     assert np.isfinite(np.asarray(fresh.state.body.qpos)).all()
     file, video = str(run / "not_finite" / "000001.npz"), tmp_path / "film.gif"
-    assert main(["play", "--state", file, "--simulator", "mujoco", "--steps", "1", "--video", str(video)]) == 0
+    assert main(["replay-nan", "--state", file, "--simulator", "mujoco", "--steps", "1", "--video", str(video)]) == 0
     said = capsys.readouterr().out
     assert "robot 3, iteration 2" in said and "blocks" in said
     assert "FL_calf is 1000000000" in said and video.stat().st_size > 1000
@@ -182,6 +182,6 @@ def test_play_refuses_what_is_no_state(tmp_path, capsys):
         (["--state", str(other), "--steps", "0"], "--steps"),
         (["--state", str(other), "--video", "film.avi"], ".mp4"),
     ):
-        assert main(["play", *arguments]) == 2
+        assert main(["replay-nan", *arguments]) == 2
         error = capsys.readouterr().err
         assert words in error and len(error.strip().splitlines()) == 1

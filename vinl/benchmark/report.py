@@ -15,7 +15,7 @@ from vinl.chain.records import EpisodeRecord, Results
 from vinl.config.loader import load_config
 from vinl.config.output import write_text
 from vinl.config.versions import describe_environment
-from vinl.render.drawing import draw_histogram, draw_map
+from vinl.render.drawing import POINT_DT, draw_histogram, draw_map
 
 _SHOWN = ("vinl", "vinl_no_clutter", "rough")
 """Rows of the paper's table that every report shows."""
@@ -49,6 +49,7 @@ def render_report(results: Results, command: str) -> str:
             {
                 "plan": plan,
                 "map": draw_map(plan, episodes, mine[0], rules["success_radius"]),
+                "longest": max(e.record.time_s for e in episodes),
                 "aggregate": aggregate_episodes([e.record for e in episodes], rules["min_metres"]),
                 "rows": [rows[k] for k in mine],
                 "notes": sorted({e.record.note for e in episodes if e.record.note}),
@@ -78,6 +79,7 @@ def render_report(results: Results, command: str) -> str:
         policies=results.policies,
         environment=describe_environment(),
         videos=results.videos,
+        point_dt=POINT_DT,
         command=command,
         wall_seconds=results.wall_seconds,
     )

@@ -15,7 +15,11 @@ COMMANDS = {
     "eval-loco": ("vinl.cli.eval_loco", "the locomotor alone in MuJoCo, under random commands"),
     "eval-nav": ("vinl.cli.eval_nav", "the navigator alone, in homes that it has never seen"),
     "train-loco": ("vinl.cli.train_loco", "train a locomotor (needs the train extra)"),
-    "play": ("vinl.cli.play", "look again at a robot whose numbers went wrong in a training (needs the train extra)"),
+    "play": (
+        "vinl.cli.play",
+        "watch and drive the robot in the browser, or scrub a recording (needs the viewer extra)",
+    ),
+    "replay-nan": ("vinl.cli.replay_nan", "look again at a robot whose numbers went wrong in a training (train extra)"),
     "train-nav": ("vinl.cli.train_nav", "train a navigator (needs the train extra)"),
     "plans": ("vinl.cli.plans", "list the shipped floor plans, draw a floor plan"),
     "policies": ("vinl.cli.policies", "the trained policies that come with vinl, and their measured figures"),

@@ -1,77 +1,98 @@
-"""``vinl play``: look at a robot whose numbers went wrong in a training."""
+"""``vinl play``: the chain, or a recording of it, live in the browser."""
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
-from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
 
 from vinl.cli.options import parse_options
 from vinl.config.errors import InputError
 
+if TYPE_CHECKING:
+    from vinl.viewer.viewer import Viewer
+
 
 @dataclass(frozen=True)
 class Options:
-    """Step a robot again from a state that a training saved (FOLDER/not_finite/NUMBER.npz), and tell what goes wrong.
+    """Watch the robot in the browser and drive it: click a goal, or use the keyboard and sliders; drop blocks, push it,
+    pause, go step by step; see what its cameras see. Or scrub through an episode that vinl eval --record kept."""
 
-    The action of the step that went wrong is held.
-    """
-
-    state: str
-    """File that the training wrote."""
-    simulator: str = "mjx"
-    """mjx: the simulator of the training, on the CPU; mujoco: MuJoCo C with the same model and ground."""
-    steps: int = 5
-    """Control steps of 20 ms, four physics steps each."""
-    video: str | None = None
-    """Also write a film, .mp4 or .gif: one picture for each physics step, ten a second."""
+    plan: str | None = None
+    """Floor plan: a shipped one's name, or a file (see vinl eval); by default the first shipped one."""
+    terrain: str | None = None
+    """Open ground in place of a floor plan: flat, or blocks (the test of vinl eval-loco)."""
+    loco: Annotated[str | None, tyro.conf.arg(aliases=("--policy",))] = None
+    """Locomotion policy: a shipped one's name, a policy folder or a run folder; by default the best that is shipped."""
+    nav: str | None = None
+    """Navigation policy: the same, or oracle (follows the shortest path); by default nav, on open ground oracle."""
+    obstacles: str = "paper"
+    """Clutter in a floor plan: none, paper (1 block per m2) or dense (1.5 per m2)."""
+    density: float = 1.0
+    """Blocks per m2 on open ground, 0 to 4."""
+    seed: int = 0
+    """Of clutter and start; the same as in vinl eval."""
+    replay: str | None = None
+    """Folder of vinl eval --record: show its episodes instead of a live robot."""
+    episode: int = 0
+    """Which episode of the folder, counted from 0 in the order of results.json."""
+    pace: float = 1.0
+    """Speed of time at the beginning, 0.05 to 4; 1 is real time."""
+    port: int = 8080
+    """Port to listen on; 0 takes any free one."""
+    host: str = "127.0.0.1"
+    """Address to listen on; 0.0.0.0 lets other machines in."""
 
 
 def main(argv: list[str]) -> int:
-    """Print what happens; 0 whether or not anything goes wrong."""
+    """Show the page until Ctrl-C."""
     options = parse_options(Options, argv, "play")
-    if not 1 <= options.steps <= 500:
-        raise InputError(f"--steps must lie between 1 and 500, got {options.steps}")
-    video = None if options.video is None else Path(options.video)
-    if video is not None and video.suffix not in (".mp4", ".gif"):
-        raise InputError(f"--video {video} must end with .mp4 or .gif")
-    os.environ.setdefault("JAX_PLATFORMS", "cpu")
-    import numpy as np
+    _check(options)
+    from rich.console import Console
 
-    from vinl.loco.replay import load_lost, replay
-    from vinl.robot.aliengo import PHYSICS_DT
+    from vinl.viewer.play import require_viser
 
-    state = load_lost(options.state)
-    print(state.describe())
-    played = replay(state, options.steps, options.simulator)
-    print(f"again in {options.simulator}, physics steps of {PHYSICS_DT * 1000:.0f} ms:")
-    print(f"{'ms':>5}  {'height [m]':>10}  {'joint speed':>11}  {'torque [N m]':>12}  {'acceleration':>12}")
-    rows = list(zip(played.qpos, played.qvel, played.torque, played.acceleration, strict=True))
-    for k, (qpos, qvel, torque, acceleration) in enumerate(rows):
-        if k > _SHOWN and k < len(rows) - 1:
-            continue
-        fastest, strongest, hardest = (np.abs(x).max() for x in (qvel[6:], torque, acceleration))
-        print(f"{k * PHYSICS_DT * 1000:5.0f}  {qpos[2]:10.3f}  {fastest:11.4g}  {strongest:12.4g}  {hardest:12.4g}")
-    if played.wrong is None:
-        print(
-            f"nothing went wrong in {(len(rows) - 1) * PHYSICS_DT:.3f} s: either rounding on this processor saves it, "
-            "or the cause lies outside the physics"
-        )
-    else:
-        row, what = played.wrong
-        print(f"after {row * PHYSICS_DT * 1000:.0f} ms: {what}")
-    if video is not None:
-        from vinl.render.state_film import film_state
-
-        if not np.isfinite(played.qpos[0]).all():
-            raise InputError(f"{options.state}: the saved pose itself is not finite; there is nothing to film")
-        texts = [f"{k * PHYSICS_DT * 1000:.0f} ms" for k in range(len(rows))]
-        if played.wrong is not None:
-            texts = [t if k < played.wrong[0] else f"{t}: {played.wrong[1]}" for k, t in enumerate(texts)]
-        film_state(played.qpos, texts, played.field, video)
-        print(f"film: {video}")
+    require_viser("vinl play")
+    console = Console()
+    with console.status("loading"):
+        viewer = _open(options)
+    console.print(f"open {viewer.url} in a browser; Ctrl-C ends it", soft_wrap=True, highlight=False)
+    try:
+        viewer.wait()
+    except KeyboardInterrupt:
+        console.print("closed")
+    finally:
+        viewer.close()
     return 0
 
 
-_SHOWN = 20
-"""Rows that are printed from the start; the last one always is."""
+def _check(options: Options) -> None:
+    given = [name for name in ("plan", "terrain", "replay") if getattr(options, name) is not None]
+    if len(given) > 1:
+        raise InputError(f"--{given[0]} and --{given[1]} do not go together; give one of them")
+    if options.replay is not None and (options.loco is not None or options.nav is not None):
+        raise InputError("--replay shows what was recorded; it takes no --loco, --policy or --nav")
+    if not 0 <= options.port <= 65535:
+        raise InputError(f"--port must lie between 0 and 65535, got {options.port}")
+    if options.seed < 0:
+        raise InputError(f"--seed must not be negative, got {options.seed}")
+
+
+def _open(options: Options) -> Viewer:
+    from vinl.viewer.play import play, replay
+
+    server = {"host": options.host, "port": options.port}
+    if options.replay is not None:
+        return replay(options.replay, options.episode, pace=options.pace, **server)
+    return play(
+        options.plan,
+        options.loco,
+        options.nav,
+        options.obstacles,
+        options.seed,
+        terrain=options.terrain,
+        density=options.density,
+        pace=options.pace,
+        **server,
+    )

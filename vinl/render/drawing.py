@@ -20,6 +20,9 @@ from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 CONTACT_CLASS = dict(zip(KINDS, ("fb", "fw", "lb", "lw", "tb", "tw"), strict=True))
 """Style class of each kind of contact."""
 
+POINT_DT = 0.2
+"""Time between two points of a way on the map [s]."""
+
 _MARGIN = 0.4
 _GRAIN = 0.02
 
@@ -37,19 +40,23 @@ def outline_boxes(boxes: Boxes) -> str:
 
 
 def outline_way(path: Float[np.ndarray, "k 2"]) -> str:
-    """Path data of a way [m]: every second point, to the centimetre."""
-    points = path[::2] if len(path) > 4 else path
-    return "M" + "L".join(f"{x:.2f} {-y:.2f}" for x, y in np.vstack([points, path[-1]]))
+    """Path data of a way [m]: every second point, ``POINT_DT`` apart, and where it ended; to the centimetre."""
+    return "M" + "L".join(f"{x:.2f} {-y:.2f}" for x, y in np.vstack([path[::2], path[-1]]))
 
 
-def mark_contacts(trace: EpisodeTrace) -> list[tuple[str, str]]:
-    """Style class and path data of every kind of contact: a dot at each place, places 2 cm apart told apart."""
+def mark_contacts(trace: EpisodeTrace) -> list[tuple[str, str, str]]:
+    """Style class, path data and times of every kind of contact.
+
+    A dot at each place, places 2 cm apart told apart; for each the time of its first contact in tenths of a second.
+    """
     marks = []
     for kind, name in enumerate(KINDS):
         at = trace.contacts[trace.contacts[:, 1] == kind, 2:]
         if len(at):
-            places = np.unique(np.rint(at / _GRAIN), axis=0) * _GRAIN
-            marks.append((CONTACT_CLASS[name], "".join(f"M{x:.2f} {-y:.2f}h0" for x, y in places)))
+            places, first = np.unique(np.rint(at / _GRAIN), axis=0, return_index=True)
+            times = 10 * trace.contacts[trace.contacts[:, 1] == kind, 0][first]
+            dots = "".join(f"M{x:.2f} {-y:.2f}h0" for x, y in places * _GRAIN)
+            marks.append((CONTACT_CLASS[name], dots, " ".join(f"{time:.0f}" for time in times)))
     return marks
 
 
@@ -86,11 +93,14 @@ def draw_map(plan: FloorPlan, episodes: Sequence[Episode], first: int, radius: f
     ]
     for k, episode in enumerate(episodes):
         record, trace = episode.record, episode.trace
-        marks = "".join(f'<path class="touch {name}" d="{data}"/>' for name, data in mark_contacts(trace))
+        marks = "".join(
+            f'<path class="touch {name}" d="{data}" data-times="{times}"/>'
+            for name, data, times in mark_contacts(trace)
+        )
         ex, ey = trace.path[-1]
         lost = "" if record.success else f'<path class="lost" d="{_cross(ex, ey)}"/>'
         parts.append(
-            f'<g class="ep {record.end_reason}" id="e{first + k}"><path class="block" '
+            f'<g class="ep {record.end_reason}" id="e{first + k}" data-end="{record.time_s:.2f}"><path class="block" '
             f'd="{outline_boxes(Blocks(trace.blocks).boxes())}"/><path class="way" d="{outline_way(trace.path)}"/>'
             f"{marks}{lost}<title>episode {record.episode}, seed {record.seed}: {record.end_reason}, "
             f"{record.distance_m:.1f} m in {record.time_s:.0f} s</title></g>"

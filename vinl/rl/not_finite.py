@@ -56,7 +56,7 @@ def judge_losses(
     where = folder.path / LOST
     return (
         f"{count:.0f} of {robot_steps} robot steps in iteration {iteration} were not finite{causes}, more than one in "
-        f"a thousand; look at one of them with  vinl play --state {where}/{FIRST}"
+        f"a thousand; look at one of them with  vinl replay-nan --state {where}/{FIRST}"
     )
 
 

@@ -116,7 +116,7 @@ class RunFolder:
             raise InputError(f"{file} is broken ({first}); remove it to start the run anew") from None
 
     def save_lost(self, state: dict[str, Any]) -> Path | None:
-        """Save the state of a robot whose numbers went wrong, with the run's configuration; ``vinl play`` reads it.
+        """Save the state of a robot whose numbers went wrong, with the run's configuration, for ``vinl replay-nan``.
 
         Args:
             state: numbers, arrays and text by name.

@@ -1,0 +1,143 @@
+"""The page of ``vinl play`` in a real browser: it loads, is clicked and typed at, and the robot does what it is asked.
+
+Needs Chromium (Debian: ``apt-get install chromium``); pictures are drawn by its software renderer.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--enable-unsafe-swiftshader",
+    "--use-angle=swiftshader",
+]
+PATIENCE = 60_000
+"""Milliseconds: the browser draws without a GPU, on cores that other tests use too."""
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here: the page of vinl play was not tried in a browser"),
+]
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        profile = tmp_path_factory.mktemp("profile")
+        started = playwright.chromium.launch(
+            executable_path=CHROMIUM, headless=True, args=FLAGS, env={**os.environ, "HOME": str(profile)}
+        )
+        yield started
+        started.close()
+
+
+@contextmanager
+def served(*options: str) -> Iterator[str]:
+    """``vinl play`` in a process of its own; the address of its page."""
+    command = [sys.executable, "-m", "vinl.cli.app", "play", "--port", "0", *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        assert process.stdout is not None
+        said = []
+        try:
+            for line in process.stdout:
+                said.append(line)
+                found = re.search(r"http://localhost:\d+", line)
+                if found:
+                    yield found[0]
+                    return
+            raise AssertionError("".join(said))
+        finally:
+            process.terminate()
+
+
+@contextmanager
+def opened(browser: Browser, url: str) -> Iterator[Page]:
+    """The page, which must not have complained in the end."""
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.set_default_timeout(PATIENCE)
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(url)
+    page.wait_for_selector("#vinl-state")
+    yield page
+    assert complaints == []
+    page.close()
+
+
+def number(page: Page, figure: str) -> float:
+    """The first number of a figure on the page."""
+    found = re.search(r"-?\d+(\.\d+)?", page.inner_text(f"#vinl-{figure}"))
+    assert found is not None
+    return float(found[0])
+
+
+def until(page: Page, condition: str) -> None:
+    """Wait for a condition in JavaScript on the page."""
+    page.wait_for_function(f"() => {{ {_TEXT} return {condition}; }}", timeout=PATIENCE)
+
+
+_TEXT = """
+const text = key => document.getElementById("vinl-" + key).innerText, value = key => parseFloat(text(key));
+const images = () => [...document.images].map(image => image.src).join();
+"""
+
+
+def test_robot_walks_to_a_clicked_goal_and_is_driven_by_keys(browser: Browser):
+    options = "--plan harbour_flat --loco loco --nav oracle --obstacles none"
+    with served(*options.split()) as url, opened(browser, url) as page:
+        assert page.inner_text("#vinl-state") == "standing" and "click the floor" in page.inner_text("#vinl-goal")
+        page.evaluate(f"() => {{ {_TEXT} window.before = images(); }}")
+        canvas = page.locator("canvas").first.bounding_box()
+        assert canvas is not None
+        page.mouse.click(canvas["x"] + 0.62 * canvas["width"], canvas["y"] + 0.45 * canvas["height"])
+        until(page, 'text("state") === "walking"')
+        until(page, 'value("distance") > 0.5')
+        until(page, "images() !== window.before")
+        until(page, 'value("factor") > 0')
+
+        page.keyboard.press("o")
+        until(page, 'text("state") === "standing"')
+        for _ in range(3):
+            page.keyboard.press("i")
+        until(page, 'text("state") === "driven" && value("command") > 0.25')
+
+        page.keyboard.press("p")
+        until(page, 'text("state").endsWith("paused")')
+        time, place = number(page, "time"), page.inner_text("#vinl-place")
+        page.wait_for_timeout(500)
+        assert number(page, "time") == time and page.inner_text("#vinl-place") == place
+        page.keyboard.press("n")
+        until(page, f'value("time") > {time}')
+        assert number(page, "time") == pytest.approx(time + 0.02)
+
+        page.keyboard.press("r")
+        until(page, 'text("state") === "standing" && value("distance") < 0.3')
+
+
+def test_block_is_dropped_by_a_click_and_clutter_drawn_by_a_button(browser: Browser):
+    with served("--terrain", "flat", "--policy", "rough") as url, opened(browser, url) as page:
+        assert number(page, "blocks") == 0
+        canvas = page.locator("canvas").first.bounding_box()
+        assert canvas is not None
+        page.keyboard.down("Shift")
+        page.mouse.click(canvas["x"] + 0.75 * canvas["width"], canvas["y"] + 0.4 * canvas["height"])
+        page.keyboard.up("Shift")
+        until(page, 'value("blocks") === 1')
+        page.get_by_text("Clear", exact=True).click()
+        until(page, 'value("blocks") === 0')

@@ -1,0 +1,354 @@
+"""The chain on one robot, a control step at a time, with goal, command, clutter and policies changed in between."""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from vinl.chain.choose import check_cameras, choose_locomotor
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.contacts import KINDS
+from vinl.chain.controller import give_senses
+from vinl.chain.depth_cameras import Eyes, open_eyes
+from vinl.chain.navigators.base import Navigator, Task, check_choice
+from vinl.chain.navigators.choose import load_navigator
+from vinl.chain.robot import Walker, joint_targets
+from vinl.chain.rollout import goal_in_heading_frame
+from vinl.chain.scene import FORCE_SENSORS, build_scene
+from vinl.config.errors import InputError
+from vinl.policies.policy import Policy
+from vinl.robot.aliengo import CONTROL_DT, FOOT_GEOMS
+from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
+from vinl.robot.rotation import yaw_of
+from vinl.viewer.requests import (
+    ChangePolicies,
+    Drive,
+    OpenPlan,
+    PlaceRobot,
+    Push,
+    Request,
+    Reset,
+    ScatterClutter,
+    SetGoal,
+    ToggleBlock,
+)
+from vinl.viewer.snapshot import DepthImage, Footholds, Snapshot
+from vinl.viewer.world import World, draw_block, open_home
+from vinl.world.free_space import FreeSpace
+from vinl.world.geodesic import distance_field, read_field
+from vinl.world.readers import load_floorplan
+from vinl.world.start_goal import StartGoal
+
+CONTACT_MEMORY = 6.0
+"""Contacts of so many last seconds are shown [s]."""
+
+SNAP = 0.5
+"""A goal off the free floor is moved to the nearest place where the robot fits, at most this far [m]."""
+
+_PATH_EVERY = 5
+_LIMBS = ("foot", "leg", "trunk")
+
+
+@runtime_checkable
+class TellsFootholds(Protocol):
+    """A policy or navigator that knows where the feet are to come down."""
+
+    def footholds(self) -> dict[str, Float[np.ndarray, "n 4 3"]]:
+        """``planned`` and ``predicted`` footholds, as far as there are such, in the robots' heading frames [m]: the
+        origin in the middle of the trunk, x along its heading, z up."""
+        ...
+
+
+class LiveChain:
+    """One robot in a world, driven by its policies.
+
+    Args:
+        world: where it walks.
+        locomotion: locomotion policy, or its name or folder; None: the best shipped one.
+        navigation: navigator, or its name or folder.
+        config: rules of the evaluation: how often the navigator decides, what is a fall, what a goal reached.
+        seed: of what is drawn: clutter, dropped blocks.
+    """
+
+    dt = CONTROL_DT
+    """Time of a step [s]."""
+
+    def __init__(
+        self,
+        world: World,
+        locomotion: str | Path | Policy | None,
+        navigation: str | Path | Navigator,
+        config: EvaluationConfig,
+        seed: int = 0,
+    ) -> None:
+        self._config, self._rng = config, np.random.Generator(np.random.Philox(seed))
+        self._locomotion = choose_locomotor(locomotion)
+        self._navigator = self._load_navigator(navigation)
+        check_cameras(self._locomotion, self._navigator)
+        self._enter(world)
+
+    # ---- from outside ----------------------------------------------------------------------------------------------
+
+    def apply(self, request: Request) -> str:
+        """Do what is asked.
+
+        Returns:
+            What there is to say about it; empty for nothing.
+
+        Raises:
+            InputError: it cannot be done; nothing has changed then.
+        """
+        match request:
+            case Reset():
+                self._put_down(self._home)
+            case SetGoal(x, y):
+                return self._go_to(np.array([x, y]))
+            case Drive(forward, turn):
+                self._goal, self._state = None, "driven" if forward or turn else "standing"
+                self._command[:] = [[forward, 0.0, turn]]
+            case Push(speed, angle):
+                towards = angle + self._yaw
+                self._walker.qvel[:2] += speed * np.array([np.cos(towards), np.sin(towards)])
+            case PlaceRobot(x, y):
+                self._place(np.array([x, y]))
+            case ToggleBlock(x, y):
+                self._toggle_block(np.array([x, y]))
+            case ScatterClutter(preset):
+                self._rebuild(self.world.scattered(preset, self._rng, self._xy))
+                return f"{len(self.world.blocks)} blocks"
+            case ChangePolicies(locomotion, navigation):
+                self._change_policies(locomotion, navigation)
+            case OpenPlan(plan):
+                self._enter(
+                    open_home(load_floorplan(plan), "paper" if len(self.world.blocks) else "none", 0, self._config)
+                )
+            case _:
+                raise InputError(f"{type(request).__name__} is for recordings")
+        return ""
+
+    def step(self) -> bool:
+        """One control step.
+
+        Returns:
+            Whether time should stop: the robot has just fallen.
+        """
+        if self._state == "fallen":
+            return True
+        if self._goal is not None and self._since_goal % self._config.navigation_period == 0:
+            self._decide(self._goal)
+        self._since_goal += 1
+        qpos, qvel = self._walker.qpos[None].copy(), self._walker.qvel[None].copy()
+        self._actions = self._senses.act(qpos, qvel, self._command, self._actions)
+        self._walker.step(joint_targets(self._actions, self._locomotion.card)[0])
+        self._count()
+        if self._walker.has_fallen(self._config.max_tilt):
+            self._state, self._goal = "fallen", None
+            return True
+        if self._goal is not None and np.linalg.norm(self._xy - self._goal) < self._config.success_radius:
+            self._state, self._goal = "reached", None
+            self._command[:] = 0.0
+        return False
+
+    def snapshot(self, look: bool) -> Snapshot:
+        """The present moment. ``look``: render depth images anew."""
+        if look or not self._images:
+            qpos = self._walker.qpos[None]
+            self._images = {
+                name: DepthImage(camera.camera, camera.look(qpos)[0].numpy().copy())
+                for name, camera in self._cameras.items()
+            }
+        data: Any = self._walker.data
+        return Snapshot(
+            world=self.world,
+            time_s=self._steps * CONTROL_DT,
+            state=self._state,
+            qpos=self._walker.qpos.copy(),
+            velocity=self._velocity(),
+            command=self._command[0].copy(),
+            goal=None if self._goal is None else self._goal.copy(),
+            path=np.array([*self._path, self._xy]),
+            distance_m=self._distance,
+            contacts=np.array(self._contacts, np.float64).reshape(-1, 5),
+            contact_steps=(self._limb_steps[0], self._limb_steps[1], self._limb_steps[2]),
+            feet=data.geom_xpos[self._feet].copy(),
+            foot_forces=np.linalg.norm(data.sensordata[self._forces].reshape(4, 3), axis=1),
+            images=self._images,
+            footholds=self._read_footholds(),
+        )
+
+    # ---- the robot -------------------------------------------------------------------------------------------------
+
+    @property
+    def _xy(self) -> Float[np.ndarray, "2"]:
+        return self._walker.qpos[:2].copy()
+
+    @property
+    def _yaw(self) -> float:
+        return float(yaw_of(np, self._walker.qpos[3:7]))
+
+    def _velocity(self) -> Float[np.ndarray, "3"]:
+        c, s = np.cos(self._yaw), np.sin(self._yaw)
+        x, y = self._walker.qvel[:2]
+        return np.array([c * x + s * y, -s * x + c * y, self._walker.qvel[5]])
+
+    def _count(self) -> None:
+        """Path and contacts of the step."""
+        now = self._xy
+        self._distance += float(np.linalg.norm(now - self._at))
+        self._at = now
+        self._steps += 1
+        if self._steps % _PATH_EVERY == 0:
+            self._path.append(now)
+        time = self._steps * CONTROL_DT
+        touches = list(self._walker.contacts.touches.values())
+        self._contacts.extend((time, touch.kind, touch.x, touch.y, touch.z) for touch in touches)
+        while self._contacts and self._contacts[0][0] < time - CONTACT_MEMORY:
+            self._contacts.popleft()
+        limbs = {KINDS[touch.kind].split("_")[0] for touch in touches}
+        for k, limb in enumerate(_LIMBS):
+            self._limb_steps[k] += limb in limbs
+
+    def _put_down(self, pose: Float[np.ndarray, "3"]) -> None:
+        """Let the robot stand somewhere, all memory gone; a goal stays."""
+        self._home = pose
+        x, y, yaw = pose.tolist()
+        self._walker.spawn(x, y, yaw, self.world.joints)
+        self._locomotion.reset(1)
+        self._actions = np.zeros((1, 12), np.float32)
+        self._steps, self._distance, self._at = 0, 0.0, self._xy
+        self._path: list[np.ndarray] = [self._xy]
+        self._contacts: deque[tuple[float, int, float, float, float]] = deque()
+        self._limb_steps = [0, 0, 0]
+        self._command, self._since_goal = np.zeros((1, 3)), 0
+        self._state, self._images = "standing", dict[str, DepthImage]()
+        if self._goal is not None:
+            self._go_to(self._goal)
+
+    def _place(self, xy: Float[np.ndarray, "2"]) -> None:
+        if len(self.world.blocks) and self.world.blocks.boxes().distances(xy[None]).min() < 0.25:
+            raise InputError("the robot cannot be put down there: a block is in the way")
+        self._goal = None
+        self._put_down(np.array([*self._fit(xy), self._yaw]))
+
+    # ---- the goal --------------------------------------------------------------------------------------------------
+
+    def _fit(self, xy: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
+        """The point itself if the robot fits there, or the nearest one where it does."""
+        space = self._space
+        row, column = space.plan.frame.cell(xy)
+        if space.traversable[row, column] and np.abs(space.plan.frame.xy(np.array([row, column])) - xy).max() < 0.1:
+            return xy
+        cells = space.plan.frame.xy(np.argwhere(space.traversable))
+        away = np.linalg.norm(cells - xy, axis=1)
+        if away.min() > SNAP:
+            raise InputError("the robot does not fit there")
+        return cells[away.argmin()]
+
+    def _go_to(self, wanted: Float[np.ndarray, "2"]) -> str:
+        if self._state == "fallen":
+            raise InputError("the robot has fallen; reset it first")
+        goal, space = self._fit(wanted), self._space
+        way = float(read_field(distance_field(space.traversable, space.plan.frame, goal), space.plan.frame, self._xy))
+        if not np.isfinite(way):
+            raise InputError("there is no way to that goal from here")
+        route = StartGoal(self._xy, self._yaw, goal, way, float(np.linalg.norm(goal - self._xy)))
+        self._navigator.reset([Task(space, route)])
+        self._goal, self._state, self._since_goal = goal, "walking", 0
+        self._choice = np.zeros((1, 2))
+        return f"goal: {way:.1f} m to walk"
+
+    def _decide(self, goal: Float[np.ndarray, "2"]) -> None:
+        """Ask the navigator for the next command."""
+        pose = np.array([[*self._xy, self._yaw]])
+        seen: dict[str, Any] = {
+            "goal": goal_in_heading_frame(pose, goal[None]),
+            "previous_action": self._choice,
+            "pose": pose,
+            "true_pose": pose,
+        }
+        if self._navigator.camera is not None:
+            seen["depth"] = self._cameras["navigation"].look(self._walker.qpos[None])
+        self._choice = check_choice(self._navigator.act(seen), 1, self._navigator)
+        self._command[0] = [self._choice[0, 0], 0.0, self._choice[0, 1]]
+
+    # ---- the world -------------------------------------------------------------------------------------------------
+
+    def _enter(self, world: World) -> None:
+        """Put the robot into another home."""
+        self._space = FreeSpace(world.plan)
+        self._goal: np.ndarray | None = None
+        self._build(world)
+        self._put_down(world.start)
+
+    def _build(self, world: World) -> None:
+        """Physics, height scan and cameras of a world."""
+        kp, kd = (float(self._locomotion.card.action[key]) for key in ("kp", "kd"))
+        model = build_scene(world.plan.boxes, world.blocks.boxes(), kp=kp, kd=kd)
+        self._walker = Walker(model)
+        self._senses = give_senses(self._locomotion, world.plan, [world.blocks], self._config.ceiling)
+        self._cameras: dict[str, Eyes] = {
+            name: open_eyes(world.plan, [world.blocks], camera, self._config.ceiling)
+            for name, camera in self._choose_cameras().items()
+        }
+        self._feet = [int(model.geom(name).id) for name in FOOT_GEOMS]
+        first = int(model.sensor(FORCE_SENSORS[0]).adr[0])
+        self._forces = slice(first, first + 12)
+        self.world = world
+
+    def _rebuild(self, world: World) -> None:
+        """The world changes under the walking robot: its motion goes on."""
+        before: Any = self._walker.data
+        self._build(world)
+        now: Any = self._walker.data
+        for name in ("qpos", "qvel", "ctrl", "qacc_warmstart"):
+            getattr(now, name)[:] = getattr(before, name)
+        mujoco.mj_forward(self._walker.model, now)
+        self._images = {}
+
+    def _toggle_block(self, xy: Float[np.ndarray, "2"]) -> None:
+        self._rebuild(self.world.without_block(xy) or self.world.with_block(draw_block(xy, self._rng), self._xy))
+
+    # ---- the policies ----------------------------------------------------------------------------------------------
+
+    def _load_navigator(self, navigation: str | Path | Navigator) -> Navigator:
+        if isinstance(navigation, (str, Path)):
+            return load_navigator(navigation, self._config)
+        return navigation
+
+    def _choose_cameras(self) -> dict[str, Camera]:
+        """The cameras of the policies; where one has none, the robot's own, to look through."""
+        return {
+            "locomotion": self._locomotion.camera or LOCOMOTION_CAMERA,
+            "navigation": self._navigator.camera or NAVIGATION_CAMERA,
+        }
+
+    def _change_policies(
+        self, locomotion: str | Path | Policy | None, navigation: str | Path | Navigator | None
+    ) -> None:
+        legs = self._locomotion if locomotion is None else choose_locomotor(locomotion)
+        guide = self._navigator if navigation is None else self._load_navigator(navigation)
+        check_cameras(legs, guide)
+        goal, self._goal = self._goal, None
+        self._locomotion, self._navigator = legs, guide
+        legs.reset(1)
+        self._actions = np.zeros((1, 12), np.float32)
+        self._rebuild(self.world)
+        if goal is not None:
+            self._go_to(goal)
+
+    def _read_footholds(self) -> Footholds:
+        """What the policies tell of their footholds, in the world frame."""
+        found: dict[str, np.ndarray] = {}
+        for one in (self._senses, self._locomotion):
+            if isinstance(one, TellsFootholds):
+                found.update({name: self._in_world(points[0]) for name, points in one.footholds().items()})
+        return Footholds(found.get("planned"), found.get("predicted"))
+
+    def _in_world(self, points: Float[np.ndarray, "4 3"]) -> Float[np.ndarray, "4 3"]:
+        c, s = np.cos(self._yaw), np.sin(self._yaw)
+        return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + self._walker.qpos[:3]
