@@ -36,7 +36,7 @@ def cells(two_rooms: FloorPlan) -> FloorPlan:
 
 def test_separate_rooms_are_walked_one_by_one(cells: FloorPlan, standing: LocomotionPolicy) -> None:
     """Starts and goals lie in one room, and every episode says that floor was left out."""
-    results = evaluate([cells], standing, episodes=3, seeds=1, config=SHORT)
+    results = evaluate([cells], standing, "oracle", episodes=3, seeds=1, config=SHORT)
     for record in results.records:
         assert (record.start[0] < 4.5) == (record.goal[0] < 4.5)
         assert np.isfinite(record.geodesic_m) and "of the floor is left out" in record.note
@@ -50,7 +50,7 @@ def test_a_home_of_closets_is_refused(two_rooms: FloorPlan, standing: Locomotion
         "closets", "closets.png", two_rooms.walls + bars, Boxes.empty(), two_rooms.inside, frame
     )
     with pytest.raises(InputError, match=r"closets.png.*too small for the robot"):
-        evaluate([closets], standing, episodes=1, seeds=1, config=SHORT)
+        evaluate([closets], standing, "oracle", episodes=1, seeds=1, config=SHORT)
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_locomotors_that_make_no_sense(
     two_rooms: FloorPlan, standing: LocomotionPolicy, answer: np.ndarray, words: str
 ) -> None:
     with pytest.raises(InputError, match=f"locomotor standing .*{words}"):
-        evaluate([two_rooms], Broken(standing, answer), episodes=1, seeds=1, config=SHORT)
+        evaluate([two_rooms], Broken(standing, answer), "oracle", episodes=1, seeds=1, config=SHORT)
 
 
 def test_a_learned_navigator_that_turns_to_nan(two_rooms: FloorPlan, standing: LocomotionPolicy) -> None:
@@ -143,4 +143,4 @@ def test_a_camera_that_the_robot_lacks(two_rooms: FloorPlan, change: dict, words
     network = TinyWalker()
     card = locomotion_card("walker", network.describe(), scan=False, camera=camera.describe())
     with pytest.raises(InputError, match=words):
-        evaluate([two_rooms], DepthPolicy(network, card), episodes=1, seeds=1, config=SHORT)
+        evaluate([two_rooms], DepthPolicy(network, card), "oracle", episodes=1, seeds=1, config=SHORT)

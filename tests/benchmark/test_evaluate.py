@@ -21,7 +21,7 @@ CONFIG = EvaluationConfig(time_limit=1.0)
 
 @pytest.fixture(scope="module")
 def results(two_rooms: FloorPlan, trotting: LocomotionPolicy) -> Results:
-    return evaluate([two_rooms], trotting, episodes=2, seeds=2, obstacles="paper", config=CONFIG)
+    return evaluate([two_rooms], trotting, "oracle", episodes=2, seeds=2, obstacles="paper", config=CONFIG)
 
 
 def plain(results: Results) -> dict:
@@ -32,7 +32,7 @@ def plain(results: Results) -> dict:
 
 
 def test_same_numbers_from_two_processes(results: Results, two_rooms: FloorPlan, trotting: LocomotionPolicy) -> None:
-    again = evaluate([two_rooms], trotting, episodes=2, seeds=2, obstacles="paper", config=CONFIG, workers=2)
+    again = evaluate([two_rooms], trotting, "oracle", episodes=2, seeds=2, obstacles="paper", config=CONFIG, workers=2)
     assert plain(again) == plain(results)
     for a, b in zip(results.episodes, again.episodes, strict=True):
         np.testing.assert_array_equal(a.trace.path, b.trace.path)
@@ -42,7 +42,9 @@ def test_episodes_do_not_depend_on_their_number(
     results: Results, two_rooms: FloorPlan, trotting: LocomotionPolicy
 ) -> None:
     """Seed 1 alone gives what it gave beside seed 0."""
-    alone = evaluate([two_rooms], trotting, episodes=2, seeds=1, first_seed=1, obstacles="paper", config=CONFIG)
+    alone = evaluate(
+        [two_rooms], trotting, "oracle", episodes=2, seeds=1, first_seed=1, obstacles="paper", config=CONFIG
+    )
     assert alone.records == results.records[2:]
 
 

@@ -1,13 +1,18 @@
 """What a notebook says in one line: plans with clutter, a walk, its pictures and its film."""
 
 import gc
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image
+from torch.nn.modules.module import register_module_forward_pre_hook
 
 import vinl
+from vinl.chain import progress_line
 from vinl.config.errors import InputError
 from vinl.notebook.film import cut_episode
 
@@ -17,7 +22,7 @@ SHORT = vinl.EvaluationConfig(time_limit=2.0, min_distance=2.0)
 
 @pytest.fixture(scope="module")
 def walk() -> vinl.Walk:
-    return vinl.walk(PLAN, "rough", config=SHORT, episode=1, seed=3)
+    return vinl.walk(PLAN, "rough", "oracle", config=SHORT, episode=1, seed=3)
 
 
 def test_same_seed_same_routes_and_clutter() -> None:
@@ -59,16 +64,82 @@ def test_pictures_of_a_walk(walk: vinl.Walk) -> None:
 
 
 def test_film_of_a_part_plays_inside_the_page_and_leaves_nothing(walk: vinl.Walk, tmp_path) -> None:
-    film = vinl.show_video(walk, start=1.0, stop=1.3)
+    film = vinl.show_video(walk, 1.0, 1.3)
     place = film.path.parent
     assert film.path.stat().st_size > 5_000
     assert film._repr_html_().startswith('<video controls width="800" src="data:video/mp4;base64,AAAA')
     del film
     gc.collect()
     assert not place.exists()
-    kept = vinl.show_video(walk, tmp_path, stop=0.1).path
+    kept = vinl.show_video(walk, stop=0.1, out=tmp_path).path
     gc.collect()
     assert kept.exists() and kept.parent == tmp_path
+
+
+def test_wrong_words_of_a_film(walk: vinl.Walk, tmp_path) -> None:
+    (tmp_path / "file").write_text("")
+    for arguments, words in (
+        ((walk, 0.0, 0.1, tmp_path / "file" / "film"), "is a file"),
+        ((walk, 0.0, 0.1, "/proc/films"), "nothing can be written there"),
+    ):
+        with pytest.raises(InputError, match=words):
+            vinl.show_video(*arguments)
+
+
+def test_what_is_shown_at_a_prompt_is_short(walk: vinl.Walk) -> None:
+    """The last line of a cell, or print(): one line, and in a notebook a picture or a table."""
+    plan = vinl.load_floorplan(PLAN)
+    results = vinl.evaluate(PLAN, "rough", "oracle", 1, 1, obstacles="none", config=SHORT)
+    for shown in (walk, walk.episode, walk.trace, walk.blocks, plan, plan.walls, results, vinl.load_policy("rough")):
+        assert len(repr(shown)) < 160 and "\n" not in repr(shown) and type(shown).__name__ in repr(shown)
+    assert 'src="data:image/png;base64,iVBOR' in walk._repr_html_() and "harbour_flat" in walk._repr_html_()
+    table = results._repr_html_()
+    assert table.count("<tr>") == 3 and "<td>harbour_flat</td><td>1</td>" in table
+
+
+def test_cameras_have_names(walk: vinl.Walk) -> None:
+    np.testing.assert_array_equal(walk.see(1.0, "navigation"), walk.see(1.0, vinl.NAVIGATION_CAMERA))
+    with pytest.raises(InputError, match="did you mean 'navigation'"):
+        walk.see(1.0, "navigatoin")
+    seeing = vinl.walk(PLAN, config=replace(SHORT, time_limit=0.5))
+    assert seeing.cameras["navigation"] == vinl.load_policy("nav").camera
+    assert seeing.cameras["locomotion"] == vinl.load_policy("loco").camera
+
+
+def test_defaults_are_the_product() -> None:
+    """``loco`` with ``nav`` through the paper's clutter, whoever asks."""
+    rules = replace(SHORT, time_limit=0.5)
+    walk, results = vinl.walk(PLAN, config=rules), vinl.evaluate(PLAN, episodes=1, seeds=1, config=rules)
+    assert results.policies["locomotion"]["name"] == "loco" and results.policies["navigation"]["name"] == "nav"
+    assert results.config["obstacles"]["preset"] == "paper" and results.records[0] == walk.record
+
+
+def test_torch_works_with_one_thread_and_gets_its_own_back() -> None:
+    """More of them are slower by far: the networks are small."""
+    seen: list[int] = []
+    hook = register_module_forward_pre_hook(lambda *_: seen.append(torch.get_num_threads()))
+    before = torch.get_num_threads()
+    torch.set_num_threads(3)
+    try:
+        rules = replace(SHORT, time_limit=0.5)
+        vinl.walk(PLAN, config=rules)
+        vinl.evaluate(PLAN, episodes=1, seeds=1, config=rules)
+        assert torch.get_num_threads() == 3 and seen and set(seen) == {1}
+    finally:
+        hook.remove()
+        torch.set_num_threads(before)
+
+
+def test_a_bar_is_shown_to_those_who_watch(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    monkeypatch.setattr(progress_line, "_DELAY", 0.0)
+    rules = replace(SHORT, time_limit=1.0)
+    vinl.walk(PLAN, "rough", "oracle", config=rules)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(progress_line, "is_watched", lambda: True)
+    vinl.walk(PLAN, "rough", "oracle", config=rules)
+    bar = capsys.readouterr().err
+    assert "walking:" in bar and "1 s" in bar and "left" in bar
+    assert max(map(len, bar.split("\r"))) <= 80
 
 
 def test_part_of_an_episode(walk: vinl.Walk) -> None:
@@ -85,6 +156,29 @@ def test_part_of_an_episode(walk: vinl.Walk) -> None:
 
 
 def test_bad_words() -> None:
+    with pytest.raises(InputError, match="did you mean 'harbour_flat'"):
+        vinl.walk("harbor_flat")
     for options, words in (({"obstacles": "papr"}, "did you mean"), ({"episode": -1}, "negative")):
         with pytest.raises(InputError, match=words):
             vinl.walk(PLAN, "rough", **options)
+
+
+WRONG = {
+    "vinl.evaluate([3])": "a floor plan is a name, a file or a FloorPlan, got int",
+    "vinl.walk('harbour_flat', 'rough', print)": "as_navigator",
+    "vinl.walk('harbour_flat', print)": "as_locomotor",
+    "vinl.walk('harbour_flat', 'nav')": "nav is a navigation policy",
+    "vinl.walk('harbour_flat', 'loco', 'loco')": "loco is a locomotion policy",
+    "vinl.show_video('harbour_flat')": "what vinl.walk returns, got str",
+}
+
+
+def test_wrong_kinds_are_explained() -> None:
+    """In a process of its own: here every argument's type is checked, which a user's process does not do."""
+    code = "import vinl\nfor call in {}:\n  try:\n    eval(call)\n  except vinl.InputError as error:\n    print(error)"
+    command = [sys.executable, "-c", code.format(list(WRONG))]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    lines = done.stdout.splitlines()
+    assert len(lines) == len(WRONG), done.stdout + done.stderr
+    for line, words in zip(lines, WRONG.values(), strict=True):
+        assert words in line

@@ -14,7 +14,9 @@ from vinl.world.floorplan import FloorPlan
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 def test_film_shows_the_episode(two_rooms: FloorPlan, standing: LocomotionPolicy, tmp_path: Path) -> None:
     config = EvaluationConfig(time_limit=0.32)
-    results = evaluate([two_rooms], standing, episodes=1, seeds=1, config=config, films="first", out=tmp_path / "films")
+    results = evaluate(
+        [two_rooms], standing, "oracle", episodes=1, seeds=1, config=config, films="first", out=tmp_path / "films"
+    )
     (name,) = results.videos
     with imageio.get_reader(tmp_path / "films" / name) as film:
         assert film.get_meta_data()["size"] == (1280, 720)

@@ -10,36 +10,37 @@ from pathlib import Path
 from vinl.benchmark.protocol import Films, Protocol
 from vinl.benchmark.store import Store
 from vinl.benchmark.work import Row, Shared, cut_jobs, film_job, list_keys, longest_first, missing_films, run_job
-from vinl.chain.choose import check_cameras, check_senses
+from vinl.chain.choose import check_cameras, check_senses, choose_locomotor
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.navigators.base import ORACLE, Navigator
-from vinl.chain.navigators.choose import load_navigator
+from vinl.chain.navigators.base import Navigator
+from vinl.chain.navigators.choose import choose_navigator
+from vinl.chain.progress_line import show_line
 from vinl.chain.records import Episode, Results
 from vinl.chain.workers import Crew
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
 from vinl.render.video import FilmJob
 from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan
+from vinl.world.readers import open_floorplans
 
 MAX_EPISODES, MAX_SEEDS, MAX_WORKERS = 10_000, 1_000, 1_024
 
 
 def evaluate(
-    floorplans: Sequence[FloorPlan],
-    locomotor: str | Path | Policy = "rough",
-    navigator: str | Path | Navigator = ORACLE,
+    floorplans: str | Path | FloorPlan | Sequence[str | Path | FloorPlan] = (),
+    locomotor: str | Path | Policy | None = None,
+    navigator: str | Path | Navigator | None = None,
     episodes: int = 10,
     seeds: int = 5,
     first_seed: int = 0,
-    obstacles: str = "none",
+    obstacles: str = "paper",
     config: EvaluationConfig | None = None,
     workers: int = 1,
     films: Films = "none",
-    out: Path | None = None,
-    on_progress: Callable[[str, int, int], None] = lambda *_: None,
+    out: str | Path | None = None,
+    on_progress: Callable[[str, int, int], None] | None = None,
 ) -> Results:
     """Walk through floor plans and measure how it went.
 
@@ -47,10 +48,10 @@ def evaluate(
     means processes that are spawned: call it under ``if __name__ == "__main__":`` in a script.
 
     Args:
-        floorplans: see ``vinl.world.readers``.
-        locomotor: name or folder of a policy, or a loaded one.
-        navigator: ``"oracle"``, name or folder of a navigation policy, or a navigator of one's own; with more than one
-            worker it is pickled.
+        floorplans: names, files or plans, or one of them; all shipped ones by default.
+        locomotor: name or folder of a policy, or a loaded one; ``loco`` by default.
+        navigator: name or folder of a navigation policy, ``"oracle"``, or a navigator of one's own, which is pickled
+            with more than one worker; ``nav`` by default.
         episodes: start/goal pairs a plan; the same for all seeds.
         seeds: repetitions; a seed changes clutter, heading and joint angles at the start.
         first_seed: the first of them.
@@ -59,24 +60,33 @@ def evaluate(
         workers: processes.
         films: which episodes are filmed: none, the first of every plan, or all of the first seed.
         out: folder for the films.
-        on_progress: called with what is going on, pieces done and pieces in all.
+        on_progress: called with what is going on, pieces done and pieces in all; by default a bar shows it on a
+            terminal and in a notebook.
 
     Raises:
         InputError: a name is unknown, a number is out of range, or a plan has no room for an episode.
     """
     config = config or EvaluationConfig()
-    if not floorplans:
+    opened = open_floorplans(floorplans)
+    if not opened:
         raise InputError("no floor plan to walk through; give at least one")
     if films not in ("none", "first", "all"):
         raise InputError(f"films must be none, first or all, got {films!r}")
     if films != "none" and out is None:
         raise InputError("films need a folder to be written to; give out")
     check_numbers(episodes, seeds, first_seed, obstacles, workers)
-    guide = load_navigator(navigator, config) if isinstance(navigator, (str, Path)) else navigator
-    policy = load_policy(locomotor) if isinstance(locomotor, (str, Path)) else locomotor
-    plans, span = name_apart(floorplans), range(first_seed, first_seed + seeds)
-    protocol = Protocol(plans, episodes, span, config, films=films)
-    return evaluate_rows([Row(policy, guide, obstacles)], protocol, workers, [out], on_progress=on_progress)[0]
+    row = Row(choose_locomotor(locomotor), choose_navigator(navigator, config), obstacles)
+    protocol = Protocol(name_apart(opened), episodes, range(first_seed, first_seed + seeds), config, films=films)
+    folders = [None if out is None else Path(out)]
+    if on_progress is not None:
+        return evaluate_rows([row], protocol, workers, folders, on_progress=on_progress)[0]
+    with show_line("episodes", "episodes") as show:
+
+        def note(what: str, done: int, total: int) -> None:
+            if what == "walk":
+                show(done, total)
+
+        return evaluate_rows([row], protocol, workers, folders, on_progress=note)[0]
 
 
 def evaluate_rows(

@@ -97,7 +97,8 @@ def write_report(path: Path, results: Results, command: str) -> None:
 
 
 def format_figure(figure: dict[str, Any], digits: int = 2, factor: float = 1.0) -> str:
-    """``mean ± deviation of the seeds``, or a dash."""
+    """``mean ± deviation of the seeds``, the mean alone of one seed, or a dash."""
     if figure["mean"] is None:
         return "-"
-    return f"{factor * figure['mean']:.{digits}f} ± {factor * figure['std_over_seeds']:.{digits}f}"
+    spread = figure["std_over_seeds"]
+    return f"{factor * figure['mean']:.{digits}f}" + ("" if spread is None else f" ± {factor * spread:.{digits}f}")

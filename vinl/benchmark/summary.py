@@ -59,7 +59,5 @@ def _interval(figure: dict[str, Any], factor: int, digits: int) -> str:
     if figure["mean"] is None:
         return "-"
     mean, std, (low, high) = figure["mean"], figure["std_over_seeds"], figure["ci95"]
-    return (
-        f"{factor * mean:.{digits}f} ± {factor * std:.{digits}f} over seeds "
-        f"(95 %: {factor * low:.{digits}f} to {factor * high:.{digits}f})"
-    )
+    spread = "" if std is None else f"± {factor * std:.{digits}f} over seeds "
+    return f"{factor * mean:.{digits}f} {spread}(95 %: {factor * low:.{digits}f} to {factor * high:.{digits}f})"

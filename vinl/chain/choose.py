@@ -41,6 +41,11 @@ def choose_locomotor(locomotor: str | Path | Policy | None) -> Policy:
     if locomotor is None:
         locomotor = best_locomotor()
     policy = load_policy(locomotor) if isinstance(locomotor, (str, Path)) else locomotor
+    if not all(hasattr(policy, name) for name in ("reset", "act", "card")):
+        raise InputError(
+            f"a locomotor is a name, a folder, or has reset, act and card; got {type(policy).__name__} (functions: "
+            "vinl.as_locomotor)"
+        )
     check_senses(policy)
     return policy
 

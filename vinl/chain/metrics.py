@@ -50,8 +50,9 @@ def bootstrap_interval(values: Float[np.ndarray, " n"]) -> tuple[float, float]:
 def summarise(
     values: Sequence[float], seeds: Sequence[int], share: bool = False
 ) -> dict[str, float | list[float] | None]:
-    """Mean over episodes, standard deviation of the seeds' means (divided by their number, as in the paper), and the
-    95 % interval of the mean: Wilson's for a share, by bootstrap over episodes otherwise. None if there is no value.
+    """Mean over episodes, standard deviation of the seeds' means (divided by their number, as in the paper; None of one
+    seed), and the 95 % interval of the mean: Wilson's for a share, by bootstrap over episodes otherwise. None if there
+    is no value.
     """
     if not len(values):
         return {"mean": None, "std_over_seeds": None, "ci95": None}
@@ -60,6 +61,6 @@ def summarise(
     interval = wilson_interval(round(v.sum()), len(v)) if share else bootstrap_interval(v)
     return {
         "mean": round(float(v.mean()), 6),
-        "std_over_seeds": round(float(np.std(means)), 6),
+        "std_over_seeds": round(float(np.std(means)), 6) if len(means) > 1 else None,
         "ci95": [round(interval[0], 6), round(interval[1], 6)],
     }

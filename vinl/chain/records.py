@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -90,6 +91,9 @@ class EpisodeTrace:
         commands: (f, 3) command at those times.
     """
 
+    def __repr__(self) -> str:
+        return f"EpisodeTrace({len(self.path)} points, {len(self.contacts)} contacts, {len(self.poses)} poses)"
+
     path: Float[np.ndarray, "k 2"]
     contacts: Float[np.ndarray, "m 4"]
     blocks: Float[np.ndarray, "b 6"]
@@ -103,6 +107,10 @@ class Episode:
 
     record: EpisodeRecord
     trace: EpisodeTrace
+
+    def __repr__(self) -> str:
+        r = self.record
+        return f"Episode({r.plan}, episode {r.episode}, seed {r.seed}: {r.end_reason}, {r.distance_m:.1f} m)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +139,25 @@ class Results:
     def records(self) -> list[EpisodeRecord]:
         """The records alone."""
         return [episode.record for episode in self.episodes]
+
+    def __repr__(self) -> str:
+        who = " + ".join(str(policy["name"]) for policy in self.policies.values())
+        n, plans = len(self.episodes), len(self.plans)
+        success = 100 * self.aggregate["success"]["mean"]
+        return f"Results({who}: {n} episodes in {plans} floor plans, success {success:.1f} %)"
+
+    def _repr_html_(self) -> str:
+        """Means by floor plan."""
+        titles = ("floor plan", "episodes", "success [%]", "SPL", "distance [m]", "time [s]", "falls")
+        rows = []
+        for name in [*dict.fromkeys(r.plan for r in self.records), "all"]:
+            those = [r for r in self.records if name in (r.plan, "all")]
+            means = np.mean([(100 * r.success, r.spl, r.distance_m, r.time_s) for r in those], 0)
+            shown = [f"{mean:.{digits}f}" for mean, digits in zip(means, (1, 3, 2, 1), strict=True)]
+            rows.append((html.escape(name), str(len(those)), *shown, str(sum(r.fell for r in those))))
+        head = "".join(f"<th>{title}</th>" for title in titles)
+        body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
+        return f"<p>{html.escape(repr(self))}</p><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def plain_record(record: EpisodeRecord) -> dict[str, Any]:

@@ -59,15 +59,21 @@ def main(argv: list[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
+        if error.errno in _FULL:
+            where = f"{error.filename}: " if error.filename else ""
+            return _fail(f"{where}{error.strerror}; make room, or choose another place with --out")
         if error.filename is None or error.errno not in _USERS_ERRNO:
             raise
-        return _fail(f"{error.filename}: {error.strerror}; choose another path or make room")
+        return _fail(f"{error.filename}: {error.strerror}; choose another path")
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
 
 
-_USERS_ERRNO = {errno.EACCES, errno.EPERM, errno.ENOSPC, errno.EROFS, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG}
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+"""No room on the disk, or not for this user, or not in one file."""
+
+_USERS_ERRNO = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG}
 """What goes wrong with a path that the user chose; anything else is a fault of ours and keeps its traceback."""
 
 

@@ -34,16 +34,24 @@ def check_out(out: str | Path) -> Path:
     """The folder to write to, which need not exist yet.
 
     Raises:
-        InputError: it, or a folder above it, is a file, or may not be written to.
+        InputError: it has no name, it or a folder above it is a file, or nothing can be written there.
     """
+    if not str(out).strip():
+        raise InputError("--out is empty; give the name of a folder")
     out = Path(out)
-    for path in (out, *out.parents):
-        if path.is_dir():
-            if not os.access(path, os.W_OK):
-                raise InputError(f"--out {out}: {path} may not be written to; choose another folder")
-            return out
-        if path.exists():
-            raise InputError(f"--out {out}: {path} is a file; choose another folder")
+    try:
+        for path in (out, *out.parents):
+            if path.is_dir():
+                if not os.access(path, os.W_OK):
+                    raise InputError(f"--out {out}: {path} may not be written to; choose another folder")
+                with tempfile.TemporaryDirectory(prefix=".vinl-", dir=path):  # some places only pretend, such as /proc
+                    return out
+            if path.exists():
+                raise InputError(f"--out {out}: {path} is a file; choose another folder")
+    except OSError as error:
+        raise InputError(
+            f"--out {out}: nothing can be written there ({error.strerror}); choose another folder"
+        ) from None
     return out
 
 

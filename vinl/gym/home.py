@@ -33,7 +33,7 @@ from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT
 from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan
 from vinl.world.free_space import FreeSpace
-from vinl.world.readers import load_floorplan, shipped_floorplans
+from vinl.world.readers import open_floorplans
 from vinl.world.start_goal import sample_start_goals
 
 Plans = str | Path | FloorPlan | Sequence[str | Path | FloorPlan]
@@ -258,8 +258,7 @@ class HomeEnv(gymnasium.Env):
 
 
 def _load_plans(floorplans: Plans) -> list[FloorPlan]:
-    chosen = [floorplans] if isinstance(floorplans, (str, Path, FloorPlan)) else list(floorplans)
-    plans = [p if isinstance(p, FloorPlan) else load_floorplan(p) for p in chosen or shipped_floorplans()]
+    plans = open_floorplans(floorplans)
     names = [plan.name for plan in plans]
     for name in names:
         if names.count(name) > 1:

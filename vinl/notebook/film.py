@@ -11,6 +11,7 @@ from pathlib import Path
 
 from vinl.chain.records import Episode
 from vinl.config.errors import InputError
+from vinl.config.output import check_out
 from vinl.notebook.walk import Walk
 from vinl.render.video import POSE_DT, FilmJob, film
 
@@ -34,21 +35,25 @@ class Film:
 
 
 def show_video(
-    walk: Walk, out: str | Path | None = None, start: float = 0.0, stop: float | None = None, width: int = 800
+    walk: Walk, start: float = 0.0, stop: float | None = None, out: str | Path | None = None, width: int = 800
 ) -> Film:
     """The film of a walk: the robot, what its cameras see, the map. About 0.1 s a picture, 12.5 pictures a second.
 
     Args:
         walk: the episode.
-        out: folder for the file; a temporary one by default, which is gone with the film.
         start, stop: show this part [s]; all of it by default. The clock of the film begins with it.
+        out: folder for the file; a temporary one by default, which is gone with the film.
         width: in the notebook [pixels].
 
     Raises:
-        InputError: start and stop leave nothing to show.
+        InputError: start and stop leave nothing to show, it is no walk, or the folder cannot be written to.
     """
+    if not isinstance(walk, Walk):
+        raise InputError(f"show_video shows what vinl.walk returns, got {type(walk).__name__}")
+    if isinstance(start, (str, Path)):
+        raise InputError(f"show_video(walk, start, stop): start is a time [s], got {start!r}; a folder is out=...")
     part = cut_episode(walk.episode, start, stop)
-    folder = Path(tempfile.mkdtemp(prefix="vinl-film-") if out is None else out)
+    folder = Path(tempfile.mkdtemp(prefix="vinl-film-")) if out is None else check_out(out)
     shown = Film(folder / film(FilmJob(walk.plan, part, str(folder)), walk.config), width)
     if out is None:
         weakref.finalize(shown, shutil.rmtree, folder, ignore_errors=True)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +15,19 @@ from vinl.chain.choose import choose_locomotor
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.depth_cameras import open_eyes
 from vinl.chain.episode import draw_routes, draw_setup
-from vinl.chain.navigators.base import ORACLE, Navigator
-from vinl.chain.navigators.choose import load_navigator
+from vinl.chain.navigators.base import Navigator
+from vinl.chain.navigators.choose import choose_navigator
+from vinl.chain.progress_line import show_line
 from vinl.chain.records import Episode, EpisodeRecord, EpisodeTrace
 from vinl.chain.rollout import run_episodes
+from vinl.chain.workers import one_thread
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.notebook.plans import draw_plan, open_plan
+from vinl.notebook.plans import draw_plan, embed_image, open_plan
 from vinl.policies.policy import Policy
 from vinl.render.panels import colour_depth
 from vinl.render.video import POSE_DT
+from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
 from vinl.world.blocks import Blocks
 from vinl.world.clutter import CLUTTER
@@ -29,6 +35,8 @@ from vinl.world.floorplan import FloorPlan
 from vinl.world.start_goal import StartGoal
 
 _VIEW_HEIGHT = 216
+
+_STANDARD = {"locomotion": LOCOMOTION_CAMERA, "navigation": NAVIGATION_CAMERA}
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +48,31 @@ class Walk:
         route: start and goal.
         episode: record and trace, as ``evaluate`` returns them.
         config: the rules that it was run by.
+        cameras: ``"locomotion"`` and ``"navigation"``: what its policies saw through, or the robot's standard cameras
+            where they are blind.
     """
 
     plan: FloorPlan
     route: StartGoal
     episode: Episode
     config: EvaluationConfig
+    cameras: Mapping[str, Camera] = field(default_factory=lambda: dict(_STANDARD))
+
+    def __repr__(self) -> str:
+        r = self.record
+        return f"Walk({r.plan}, episode {r.episode}, seed {r.seed}: {self.describe()})"
+
+    def describe(self) -> str:
+        """How it ended, in a few words."""
+        r = self.record
+        return (
+            f"{r.end_reason}, {r.distance_m:.1f} m in {r.time_s:.0f} s, "
+            f"{r.foot_steps} control steps with a foot on something"
+        )
+
+    def _repr_html_(self) -> str:
+        """What happened, over the path from above."""
+        return f"<p>{html.escape(repr(self))}</p>{embed_image(self.draw())}"
 
     @property
     def record(self) -> EpisodeRecord:
@@ -64,56 +91,63 @@ class Walk:
 
     def draw(self) -> Image.Image:
         """The way from above."""
-        r = self.record
-        title = (
-            f"{r.end_reason}: {r.distance_m:.1f} m in {r.time_s:.0f} s, {r.foot_steps} steps with a foot on something"
-        )
         heading = replace(self.route, yaw=self.record.yaw)  # drawn anew for every seed
-        return draw_plan(self.plan, self.blocks, [heading], [self.trace.path], title)
+        return draw_plan(self.plan, self.blocks, [heading], [self.trace.path], self.describe())
 
-    def see(self, time: float, camera: Camera = LOCOMOTION_CAMERA) -> np.ndarray:
+    def see(self, time: float, camera: str | Camera = "locomotion") -> np.ndarray:
         """What a depth camera on the trunk saw.
 
         Args:
             time: since the start [s]; poses are kept every 0.04 s.
-            camera: the record of the camera, for example ``policy.camera``.
+            camera: ``"locomotion"`` or ``"navigation"``, or the record of a camera, for example ``policy.camera``.
 
         Returns:
             (height, width) [m].
+
+        Raises:
+            InputError: the walk was over by then, or there is no such camera.
         """
+        camera = self._find(camera)
         if not 0 <= time <= self.record.time_s:
             raise InputError(f"time must lie between 0 and {self.record.time_s:g} s, got {time:g}")
         pose = self.trace.poses[min(round(time / POSE_DT), len(self.trace.poses) - 1)]
         return open_eyes(self.plan, [self.blocks], camera, self.config.ceiling).look(pose[None])[0].numpy().copy()
 
-    def draw_views(
-        self, time: float, cameras: tuple[Camera, ...] = (LOCOMOTION_CAMERA, NAVIGATION_CAMERA)
-    ) -> Image.Image:
+    def draw_views(self, time: float, cameras: Sequence[str | Camera] = ("locomotion", "navigation")) -> Image.Image:
         """The same as a picture, cameras side by side: bright is near, black is the far limit."""
         views = []
-        for camera in cameras:
+        for camera in map(self._find, cameras):
             view = Image.fromarray(colour_depth(self.see(time, camera), camera.far))
             size = (round(_VIEW_HEIGHT * camera.width / camera.height), _VIEW_HEIGHT)
             views.append(np.asarray(view.resize(size, Image.Resampling.NEAREST)))
             views.append(np.full((_VIEW_HEIGHT, 8, 3), 255, np.uint8))
         return Image.fromarray(np.concatenate(views[:-1], 1))
 
+    def _find(self, camera: str | Camera) -> Camera:
+        if isinstance(camera, Camera):
+            return camera
+        if camera not in self.cameras:
+            known = ", ".join(self.cameras)
+            raise InputError(f"there is no camera {camera!r}{closest(str(camera), self.cameras)}; known: {known}")
+        return self.cameras[camera]
+
 
 def walk(
     plan: str | Path | FloorPlan,
     locomotor: str | Path | Policy | None = None,
-    navigator: str | Path | Navigator = ORACLE,
+    navigator: str | Path | Navigator | None = None,
     obstacles: str = "paper",
     episode: int = 0,
     seed: int = 0,
     config: EvaluationConfig | None = None,
 ) -> Walk:
-    """Walk one episode: the one that ``evaluate`` runs under the same plan, number and seed.
+    """Walk one episode: the one that ``evaluate`` runs under the same plan, number and seed. On a terminal and in a
+    notebook a bar shows how much of the time limit has passed in the simulation.
 
     Args:
         plan: name, file or plan.
-        locomotor: name or folder of a policy, or one of one's own (``as_locomotor``); the best shipped one by default.
-        navigator: ``"oracle"``, name or folder of a policy, or one of one's own (``as_navigator``).
+        locomotor: name or folder of a policy, or one of one's own (``as_locomotor``); ``loco`` by default.
+        navigator: name or folder of a policy, ``"oracle"``, or one of one's own (``as_navigator``); ``nav`` by default.
         obstacles: clutter preset.
         episode: number of the start/goal pair.
         seed: of clutter, heading and joint angles at the start.
@@ -128,8 +162,16 @@ def walk(
         raise InputError(f"obstacles {obstacles!r} is no preset{closest(obstacles, CLUTTER)}; known: {known}")
     if episode < 0 or seed < 0:
         raise InputError(f"episode and seed must not be negative, got {episode} and {seed}")
-    legs = choose_locomotor(locomotor)
-    guide = load_navigator(navigator, rules) if isinstance(navigator, (str, Path)) else navigator
+    legs, guide = choose_locomotor(locomotor), choose_navigator(navigator, rules)
     route = draw_routes(home, episode + 1, rules)[episode]
     setup = draw_setup(home, route, episode, seed, CLUTTER[obstacles], rules)
-    return Walk(home, route, run_episodes(home, [setup], legs, guide, rules, filmed=(0,))[0], rules)
+    decisions = count()
+    with one_thread(), show_line("walking", "s", rules.time_limit) as show:
+
+        def note() -> bool:
+            show(next(decisions) * rules.navigation_period * CONTROL_DT, rules.time_limit)
+            return False
+
+        done = run_episodes(home, [setup], legs, guide, rules, filmed=(0,), is_stopped=note)[0]
+    seen = {"locomotion": legs.camera, "navigation": guide.camera}
+    return Walk(home, route, done, rules, {name: camera or _STANDARD[name] for name, camera in seen.items()})

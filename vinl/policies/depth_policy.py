@@ -64,6 +64,9 @@ class DepthPolicy:
         self._state: State = ()
         self._fresh = torch.zeros(0, dtype=torch.bool, device=self.device)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.card.name}, {self.card.kind}, {self.card.network['class']})"
+
     def reset(self, which: int | Bool[np.ndarray, " n"] | Bool[Tensor, " n"]) -> None:
         """Forget the past of all of n robots, or of those that a mask (n,) marks.
 

@@ -51,6 +51,9 @@ class LocomotionPolicy:
         self.network = network.eval().requires_grad_(False)
         self.device = next(network.parameters()).device
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.card.name}, {self.card.kind}, {self.card.network['class']})"
+
     def reset(self, which: int | Bool[np.ndarray, " n"] | Bool[Tensor, " n"]) -> None:
         """This policy has no memory: nothing to forget."""
 

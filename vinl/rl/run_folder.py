@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import pickle
@@ -92,13 +93,14 @@ class RunFolder:
             raise InputError(f"{file} is broken; remove it") from None
 
     def save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
-        """Replace the checkpoint, whole or not at all."""
-        scratch = self.path / (CHECKPOINT + ".new")
-        with scratch.open("wb") as file:
-            torch.save(checkpoint, file)
-            file.flush()
-            os.fsync(file.fileno())
-        scratch.replace(self.path / CHECKPOINT)
+        """Replace the checkpoint, whole or not at all.
+
+        Raises:
+            OSError: there is no room for it; it names the file.
+        """
+        packed = io.BytesIO()  # torch.save itself does not say what is wrong with the disk
+        torch.save(checkpoint, packed)
+        _write(self.path / CHECKPOINT, packed.getbuffer())
 
     def load_checkpoint(self) -> dict[str, Any] | None:
         """The newest checkpoint on the CPU, or None when the run was stopped before its first.
@@ -139,8 +141,11 @@ class RunFolder:
 
     def append_metrics(self, row: dict[str, float]) -> None:
         """Add a line to the curves."""
-        with (self.path / METRICS).open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+        try:
+            with (self.path / METRICS).open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.path / METRICS)) from None
 
     def cut_metrics(self, iteration: int) -> None:
         """Drop the lines beyond a checkpoint's iteration, and one that was cut off by a kill."""
@@ -161,6 +166,20 @@ class RunFolder:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file, whole or not at all."""
+    _write(path, text.encode())
+
+
+def _write(path: Path, data: bytes | memoryview) -> None:
     scratch = path.with_name(path.name + ".new")
-    scratch.write_text(text, encoding="utf-8")
-    scratch.replace(path)
+    try:
+        with scratch.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        scratch.replace(path)
+    except OSError as error:
+        scratch.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror, str(path)) from None
+    except BaseException:
+        scratch.unlink(missing_ok=True)
+        raise

@@ -36,6 +36,9 @@ class Blocks:
             raise InputError("blocks need positive length, width and height")
         object.__setattr__(self, "rows", rows)
 
+    def __repr__(self) -> str:
+        return f"Blocks({len(self)})"
+
     def __len__(self) -> int:
         return len(self.rows)
 

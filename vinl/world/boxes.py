@@ -41,6 +41,9 @@ class Boxes:
             raise InputError("boxes need positive length, width and height")
         object.__setattr__(self, "rows", rows)
 
+    def __repr__(self) -> str:
+        return f"Boxes({len(self)})"
+
     def __len__(self) -> int:
         return len(self.rows)
 

@@ -73,6 +73,12 @@ class FloorPlan:
     windows: Boxes = field(default_factory=Boxes.empty)
     labels: tuple[RoomLabel, ...] = ()
 
+    def __repr__(self) -> str:
+        return (
+            f"FloorPlan({self.name}: {self.area_m2:.0f} m2 free, {len(self.walls)} boxes of walls, "
+            f"{len(self.furniture)} of furniture, {len(self.labels)} rooms)"
+        )
+
     @property
     def area_m2(self) -> float:
         """Free floor [m2]."""

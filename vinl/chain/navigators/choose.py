@@ -12,6 +12,32 @@ from vinl.policies.card import read_card
 from vinl.policies.io import find_policy, list_policies, load_policy
 from vinl.robot.aliengo import CONTROL_DT
 
+SHIPPED = "nav"
+"""The navigator that comes with the package."""
+
+
+def choose_navigator(navigator: str | Path | Navigator | None, config: EvaluationConfig) -> Navigator:
+    """The navigator itself, the one of that name, or the shipped one; without one, the oracle.
+
+    Raises:
+        InputError: there is none of that name, it is a policy of another kind, or it is no navigator at all.
+    """
+    if navigator is None:
+        navigator = best_navigator()
+    if isinstance(navigator, (str, Path)):
+        return load_navigator(navigator, config)
+    if not all(hasattr(navigator, name) for name in ("reset", "act", "camera")):
+        raise InputError(
+            f"a navigator is a name, a folder, or has reset, act and camera; got {type(navigator).__name__} "
+            "(a function: vinl.as_navigator)"
+        )
+    return navigator
+
+
+def best_navigator() -> str:
+    """Name of the navigator that is taken where none is named."""
+    return SHIPPED if SHIPPED in list_policies() else ORACLE
+
 
 def load_navigator(name: str | Path, config: EvaluationConfig, device: str = "cpu") -> Navigator:
     """The oracle, or a trained navigator.

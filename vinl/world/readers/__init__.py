@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from vinl.config.errors import InputError
+from vinl.config.fields import closest
 from vinl.config.paths import assets_dir
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers.image import read_image_plan
@@ -18,7 +19,7 @@ ROS_MAPS = (".yaml", ".yml")
 JSONS = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
 MESHES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 
-__all__ = ["check_file", "expand_paths", "load_floorplan", "load_floorplans", "shipped_floorplans"]
+__all__ = ["check_file", "expand_paths", "load_floorplan", "load_floorplans", "open_floorplans", "shipped_floorplans"]
 
 
 def shipped_floorplans() -> list[str]:
@@ -87,9 +88,11 @@ def check_file(path: str | Path) -> tuple[Path, int | None]:
     if text in shipped_floorplans():
         return assets_dir() / "floorplans" / f"{text}.json", None
     file, index = _split_index(text)
-    if not file.exists():
-        known = ", ".join(shipped_floorplans())
-        raise InputError(f"{text}: no such file; give a path or one of the shipped plans: {known}")
+    if not _exists(file):
+        known = shipped_floorplans()
+        raise InputError(
+            f"{text}: no such file{closest(text, known)}; give a path or one of the shipped plans: {', '.join(known)}"
+        )
     if file.is_dir():
         raise InputError(f"{text}: is a folder; give the files in it, for example {text}/map.yaml")
     return file, index
@@ -102,14 +105,36 @@ def load_floorplans(
     wall_height: float = 2.5,
     up: str | None = None,
 ) -> list[FloorPlan]:
-    """Read several floor plans, the shipped ones if none are named; see ``load_floorplan``."""
-    return [load_floorplan(path, resolution, min_speck, wall_height, up) for path in paths or shipped_floorplans()]
+    """Read several floor plans, the shipped ones if none are named; see ``load_floorplan``. One that is named twice is
+    read once."""
+    names = dict.fromkeys(map(str, paths or shipped_floorplans()))
+    return [load_floorplan(name, resolution, min_speck, wall_height, up) for name in names]
+
+
+def open_floorplans(floorplans: str | Path | FloorPlan | Sequence[str | Path | FloorPlan]) -> list[FloorPlan]:
+    """Floor plans from names, files and plans, or from one of them; all shipped ones from an empty list.
+
+    Raises:
+        InputError: a file is missing or broken, or it is no floor plan at all.
+    """
+    chosen = [floorplans] if isinstance(floorplans, (str, Path, FloorPlan)) else list(floorplans)
+    for plan in chosen:
+        if not isinstance(plan, (str, Path, FloorPlan)):
+            raise InputError(f"a floor plan is a name, a file or a FloorPlan, got {type(plan).__name__}")
+    return [p if isinstance(p, FloorPlan) else load_floorplan(p) for p in chosen or shipped_floorplans()]
+
+
+def _exists(file: Path) -> bool:
+    try:
+        return file.exists()
+    except OSError:  # a name that no file can have
+        return False
 
 
 def _split_index(text: str) -> tuple[Path, int | None]:
     """``houses.jsonl.gz:17`` -> the file and 17. A file that really is called so comes first."""
     head, colon, tail = text.rpartition(":")
-    if not colon or Path(text).exists():
+    if not colon or _exists(Path(text)):
         return Path(text), None
     if head.lower().endswith(JSONS):
         try:
