@@ -16,6 +16,7 @@ from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.nav.config import NavConfig
 from vinl.nav.ppo_config import PpoConfig
+from vinl.nav.recurrent_ppo import guess_weights
 from vinl.nav.training import build_algorithm, make_card, separate
 from vinl.nav.warm_start import build_actor, load_critic, load_start, save_critic
 from vinl.policies.io import load_policy, save_policy
@@ -227,8 +228,18 @@ def test_the_critic_may_see_the_distance(tmp_path, small):
     assert load_policy(tmp_path / "run").network.observation_size == 7
 
 
+def test_the_memory_may_be_taught_ways_and_places(tmp_path, small):
+    both = ["--iterations", "2", "ppo.way=0.1", "ppo.places=0.3", "network.privileged=false"]
+    assert train(small, tmp_path / "run", *both) == 0
+    assert all(row["loss/guess"] > 0 for row in rows(tmp_path / "run"))
+    assert not any("guess" in name for name in load_policy(tmp_path / "run").network.state_dict())
+    weights = guess_weights(PpoConfig(way=0.1, places=0.3))
+    assert weights.shape == (2 + 81,) and weights.sum().item() == pytest.approx(0.4)
+    assert guess_weights(PpoConfig()) is None
+
+
 def test_settings_reach_the_algorithm():
     config = build_config(NavConfig, {"num_envs": 4, "camera": None, "ppo": {"clip": 0.1, "steps": 3, "lam": 0.9}})
     algorithm = build_algorithm(config, "cpu")
-    assert (algorithm.settings.clip, algorithm.settings.lam, algorithm.storage.steps) == (0.1, 0.9, 3)
+    assert (algorithm.config.clip, algorithm.config.lam, algorithm.storage.steps) == (0.1, 0.9, 3)
     assert algorithm.storage.depth is None and algorithm.model.actor.image is None

@@ -19,6 +19,7 @@ from vinl.nav.robots import make_robots
 from vinl.nav.rules import write_rules
 from vinl.nav.view_kernels import aim_cameras, draw_keys, render_interior
 from vinl.nav.way_kernel import point_ways
+from vinl.policies.places import blank_places, view_places, visit_places
 from vinl.robot.cameras import Camera
 from vinl.sensing.depth import check_device
 from vinl.sensing.odometry import Odometry
@@ -104,6 +105,8 @@ class NavEnvironment:
         if not config.odometry.is_exact:
             self._odometry = Odometry(config.odometry, n, self.device)
             self.state |= {f"odometry_{name}": tensor for name, tensor in self._odometry.state.items()}
+        if config.ppo.places > 0:
+            self.state["places"] = blank_places(n, self.device)
         self._key = self._zeros(n, dtype=torch.int32)
         self._rows = torch.arange(n, dtype=torch.int32, device=self.device)
         self._chosen = self._zeros(n, dtype=torch.bool)
@@ -154,6 +157,16 @@ class NavEnvironment:
         way = self._zeros(self.num_envs, 2)
         self._launch(point_ways, self.num_envs, [self.homes.homes, self._robots, wp.from_torch(way, dtype=wp.vec2)])
         return way
+
+    def find_places(self) -> Float[Tensor, "n view"]:
+        """Where in the 4 m around them the robots have been lately, see ``view_places``.
+
+        Raises:
+            InputError: ``ppo.places`` is 0: nobody keeps track.
+        """
+        if "places" not in self.state:
+            raise InputError("robots keep track of where they have been if ppo.places is above 0")
+        return view_places(self.state["places"], self.state["position"], self.state["yaw"])
 
     def read_measures(self) -> dict[str, float]:
         """Means over the episodes that ended since the last call (``success``, ``spl``, ``soft_spl``, ``collisions``,
@@ -211,6 +224,7 @@ class NavEnvironment:
         )
         if self._odometry is not None:
             self._odometry.advance(place, state["position"])
+        self._visit()
         state["steps"] += 1
         state["path"] += self._moved
         state["collisions"] += self._blocked
@@ -287,6 +301,8 @@ class NavEnvironment:
         self.state["start_distance"].copy_(self.state["distance"])
         self._chosen.fill_(True)
         self._draw_errors()
+        if "places" in self.state:
+            self._forget(self._chosen)
         self._observation = None
 
     def stagger(self) -> None:
@@ -312,6 +328,8 @@ class NavEnvironment:
             [self.homes.homes, self._rules, "chance", "chosen", self._robots, "unplaced"],
         )
         self._draw_errors()
+        if "places" in state:
+            self._forget(chosen)
         for name in ("steps", "path", "collisions", "in_a_row"):
             state[name].masked_fill_(chosen, 0.0)
         state["action"].masked_fill_(chosen[:, None], 0.0)
@@ -328,6 +346,18 @@ class NavEnvironment:
             sensor.restart(self._key, self._chosen)
         if self._odometry is not None:
             self._odometry.restart(self._key, self._chosen, self.state["position"])
+
+    def _forget(self, chosen: Tensor) -> None:
+        """Robots whose episodes start have been where they are, and nowhere else."""
+        places = self.state["places"]
+        start = visit_places(torch.zeros_like(places), self.state["position"], chosen)
+        places.copy_(torch.where(chosen[:, None], start, places))
+
+    def _visit(self) -> None:
+        """Note where the robots are, if somebody wants to know."""
+        if "places" in self.state:
+            never = torch.zeros(self.num_envs, dtype=torch.bool, device=self.device)
+            self.state["places"].copy_(visit_places(self.state["places"], self.state["position"], never))
 
     def _look(self) -> tuple[Tensor, Tensor]:
         n, state = self.num_envs, self.state

@@ -75,6 +75,9 @@ class PpoConfig:
         way: weight of a further loss: a linear layer on the memory's output is to tell where the shortest way leads
             (squared error of the unit vector). Only training knows that; it teaches the memory what a home is like,
             much faster than rewards do. 0: none.
+        places: weight of another such loss: a linear layer is to tell where in the 4 m around it the robot has been
+            lately (``vinl.policies.places``), so that the memory learns to keep places and to know them again. Motion
+            and images hold all that it takes. 0: none.
         max_grad_norm: gradients are clipped to this norm.
         log_std, log_std_range: logarithm of the actions' standard deviation at the start, and its limits.
         last_log_std: from ``cool_from`` on the upper limit moves to this: what is shipped acts without chance, and
@@ -106,6 +109,7 @@ class PpoConfig:
     entropy: float = 0.003
     last_entropy: float | None = None
     way: float = 0.0
+    places: float = 0.0
     max_grad_norm: float = 0.5
     log_std: float = -0.5
     log_std_range: tuple[float, float] = (-2.0, 0.2)
@@ -131,7 +135,7 @@ class PpoConfig:
         for name in ("desired_kl", "last_rate", "clip", "max_grad_norm"):
             if not getattr(self, name) > 0:
                 raise InputError(f"ppo.{name} must be positive, got {getattr(self, name)}")
-        for name in ("value", "entropy", "last_entropy", "way"):
+        for name in ("value", "entropy", "last_entropy", "way", "places"):
             if (getattr(self, name) or 0.0) < 0:
                 raise InputError(f"ppo.{name} must not be negative, got {getattr(self, name)}")
         if not 0 < self.gamma <= 1 or not 0 <= self.lam <= 1 or not 0 <= self.cool_from <= 1:

@@ -16,6 +16,9 @@ from vinl.config.loader import build_config, dump_config
 from vinl.nav.config import NavConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.home_store import HomeStore
+from vinl.nav.recurrent_model import RecurrentActorCritic
+from vinl.nav.recurrent_ppo import RecurrentPPO, guess_weights
+from vinl.nav.recurrent_storage import RecurrentStorage
 from vinl.nav.training_env import NavTrainingEnv
 from vinl.nav.warm_start import build_actor, load_critic, load_start, save_critic
 from vinl.policies.card import PolicyCard, navigation_card
@@ -25,9 +28,6 @@ from vinl.policies.nav_actor import ACTION_SIZE, NavActor
 from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers, join_peers
 from vinl.rl.peer_loop import PeerLoop, peer_folder
-from vinl.rl.recurrent_model import RecurrentActorCritic
-from vinl.rl.recurrent_ppo import RecurrentPPO, RecurrentPpoSettings
-from vinl.rl.recurrent_storage import RecurrentStorage
 from vinl.rl.run_folder import RunFolder
 from vinl.world.homes.judging import RESERVED_FROM
 
@@ -37,9 +37,6 @@ _SEEDS_BETWEEN = 10_000_000
 _HOST_THREADS = 4
 """Threads of torch on the host beside a GPU. On 64 cores a training with as many threads used 15 cores while it copied
 homes to the GPU, and several at once brought the machine to a stand."""
-
-_WAY_SIZE = 2
-"""Numbers that tell where the shortest way leads."""
 
 _RATE_DOWN, _RATE_UP = 1.5, 1.1
 """The adaptive learning rate moves by these once an update; rsl-rl's 1.5 both ways when it moves at each minibatch."""
@@ -114,7 +111,7 @@ def train_navigator(
 
     def schedule(learner: RecurrentPPO, share: float) -> None:
         learner.rate.limit(*config.ppo.rate_limits(share))
-        learner.settings.entropy = config.ppo.entropy_at(share)
+        learner.entropy = config.ppo.entropy_at(share)
         if config.ppo.last_log_std is not None:
             learner.model.limit_spread(config.ppo.spread_at(share))
         done, warmup = loop.current_learning_iteration, config.ppo.critic_warmup
@@ -128,7 +125,7 @@ def train_navigator(
 
     loop = PeerLoop(
         peers,
-        NavTrainingEnv(environment, config.network.privileged, config.ppo.way > 0, peers),
+        NavTrainingEnv(environment, config.network.privileged, config.ppo.way > 0, config.ppo.places > 0, peers),
         algorithm,
         config.ppo.steps,
         peer_folder(run, peers),
@@ -227,7 +224,8 @@ def build_algorithm(
     actor = build_actor(config)
     if weights is not None:
         actor.load_state_dict(weights)
-    hidden = _WAY_SIZE if p.way else 0
+    weights_of_guesses = guess_weights(p)
+    hidden = 0 if weights_of_guesses is None else len(weights_of_guesses)
     model = RecurrentActorCritic(
         actor,
         p.log_std,
@@ -258,22 +256,7 @@ def build_algorithm(
         _RATE_DOWN if p.adapt_each else _RATE_UP,
         device,
     )
-    settings = RecurrentPpoSettings(
-        epochs=p.epochs,
-        minibatches=p.minibatches,
-        gamma=p.gamma,
-        lam=p.lam,
-        clip=p.clip,
-        value=p.value,
-        entropy=p.entropy,
-        guess=p.way,
-        max_grad_norm=p.max_grad_norm,
-        bf16=p.bf16,
-        compiled=p.compiled,
-        graphs=p.graphs,
-        adapt_each=p.adapt_each,
-    )
-    return RecurrentPPO(model, storage, rate, settings, peers)
+    return RecurrentPPO(model, storage, rate, p, peers)
 
 
 def make_card(

@@ -17,14 +17,22 @@ class NavTrainingEnv:
     Args:
         environment: the robots of this process.
         privileged: whether observations hold the geodesic distance, for the critic.
-        ways: whether they hold where the shortest way leads, for the network to guess.
+        ways, places: whether they hold where the shortest way leads, and where the robot has been lately, for the
+            network to guess.
         peers: the processes of the training.
     """
 
     def __init__(
-        self, environment: NavEnvironment, privileged: bool = False, ways: bool = False, peers: Peers | None = None
+        self,
+        environment: NavEnvironment,
+        privileged: bool = False,
+        ways: bool = False,
+        places: bool = False,
+        peers: Peers | None = None,
     ) -> None:
-        self.environment, self._privileged, self._ways = environment, privileged, ways
+        self.environment, self._privileged = environment, privileged
+        told = ((environment.find_ways, ways), (environment.find_places, places))
+        self._hidden = [find for find, wanted in told if wanted]
         self.num_envs = environment.num_envs * (peers.count if peers else 1)
 
     def get_observations(self) -> TensorDict:
@@ -56,6 +64,6 @@ class NavTrainingEnv:
             seen["depth"] = depth
         if self._privileged:
             seen["privileged"] = self.environment.state["distance"][:, None] / DISTANCE_UNIT
-        if self._ways:
-            seen["hidden"] = self.environment.find_ways()
+        if self._hidden:
+            seen["hidden"] = torch.cat([find() for find in self._hidden], 1)
         return TensorDict(seen, batch_size=[len(vector)])

@@ -10,10 +10,10 @@ from safetensors.torch import load_file, save_file
 
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
+from vinl.nav.recurrent_model import RecurrentActorCritic
 from vinl.policies.card import PolicyCard
 from vinl.policies.io import load_policy
 from vinl.policies.nav_actor import PREVIOUS_SIZE, NavActor
-from vinl.rl.recurrent_model import RecurrentActorCritic
 
 CRITIC = "critic.safetensors"
 """File of a run beside its policy."""

@@ -11,13 +11,14 @@ from tensordict import TensorDict
 from torch import nn
 
 from vinl.config.errors import InputError
+from vinl.nav.ppo_config import PpoConfig
+from vinl.nav.recurrent_model import RecurrentActorCritic
+from vinl.nav.recurrent_ppo import RecurrentPPO
+from vinl.nav.recurrent_storage import RecurrentStorage
 from vinl.policies.depth_memory import DepthMemory
 from vinl.policies.networks import NETWORKS, PolicyNetwork
 from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers, join_peers
-from vinl.rl.recurrent_model import RecurrentActorCritic
-from vinl.rl.recurrent_ppo import RecurrentPPO, RecurrentPpoSettings
-from vinl.rl.recurrent_storage import RecurrentStorage
 
 STEPS, EPISODE = 8, 4
 
@@ -56,7 +57,10 @@ class CueTask:
 
     def observe(self):
         shown = torch.where(self.clock == 0, self.cue, 0.0)
-        observation = {"vector": torch.zeros(self.n, 1) if self.image else shown[:, None], "hidden": self.cue[:, None]}
+        observation = {
+            "vector": torch.zeros(self.n, 1) if self.image else shown[:, None],
+            "hidden": self.cue[:, None].expand(-1, 2),
+        }
         if self.image:
             observation["depth"] = (0.5 + 0.5 * shown)[:, None, None].expand(-1, 16, 16).half()
         return TensorDict(observation, batch_size=[self.n])
@@ -73,7 +77,7 @@ def build(n=64, image=False, image_type="float16", rate=3e-3, peers=None, hidden
     model = RecurrentActorCritic(ToyActor(image), guesses=hidden)
     state = model.actor.initial_state(n)
     storage = RecurrentStorage(STEPS, n, model.actor.image, image_type, 1, 0, 1, state, "cpu", hidden)
-    return RecurrentPPO(model, storage, DeviceRate(rate), RecurrentPpoSettings(**settings), peers)
+    return RecurrentPPO(model, storage, DeviceRate(rate), PpoConfig(**settings), peers)
 
 
 def roll_out(algorithm, task, observation):
@@ -107,7 +111,7 @@ def test_it_learns_what_only_memory_solves(image, image_type):
 
 def test_the_feature_learns_to_tell_what_is_hidden_without_any_reward():
     torch.manual_seed(3)
-    algorithm = build(hidden=1, guess=1.0, entropy=0.0, value=0.0)
+    algorithm = build(hidden=2, way=1.0, entropy=0.0, value=0.0)
     task = CueTask(64, False)
     task.step = lambda action, step=task.step: (lambda o, r, d, e: (o, 0 * r, d, e))(*step(action))
     _, first = learn(algorithm, task, 1)

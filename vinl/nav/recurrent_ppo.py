@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -17,50 +16,17 @@ from tensordict import TensorDict
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
+from vinl.nav.ppo_config import PpoConfig
+from vinl.nav.recurrent_model import RecurrentActorCritic
+from vinl.nav.recurrent_storage import RecurrentStorage
+from vinl.policies.places import VIEW
 from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers
-from vinl.rl.recurrent_model import RecurrentActorCritic
-from vinl.rl.recurrent_storage import RecurrentStorage
 from vinl.rl.step_graph import StepGraph
 
 _LOG_2PI = math.log(2.0 * math.pi)
 _SUMS = ("surrogate", "value", "entropy", "guess", "kl", "clipped", "gradient_norm")
 """What is added up on the device over an update."""
-
-
-@dataclass
-class RecurrentPpoSettings:
-    """Settings of the algorithm; ``learning_rate`` and the rest of the rate's are ``DeviceRate``'s.
-
-    Attributes:
-        epochs, minibatches: passes over the roll-out and parts (of robots) of each.
-        gamma, lam: discount and GAE factor.
-        clip: of the probability ratio and of the value.
-        value: weight of the value loss.
-        entropy: weight of the entropy bonus.
-        guess: weight of the squared error of the guesses at what is hidden.
-        max_grad_norm: gradients are clipped to this norm.
-        reward_scale: rewards are multiplied by this.
-        bf16: images in bfloat16 (GPU only).
-        compiled: the image network through ``torch.compile`` (GPU only).
-        graphs: minibatch steps as one CUDA graph (one GPU only).
-        adapt_each: steer the learning rate after every minibatch, as rsl-rl does; else once an update.
-    """
-
-    epochs: int = 2
-    minibatches: int = 4
-    gamma: float = 0.99
-    lam: float = 0.95
-    clip: float = 0.2
-    value: float = 0.5
-    entropy: float = 0.003
-    guess: float = 0.0
-    max_grad_norm: float = 0.5
-    reward_scale: float = 1.0
-    bf16: bool = True
-    compiled: bool = False
-    graphs: bool = False
-    adapt_each: bool = False
 
 
 class RecurrentPPO:
@@ -73,7 +39,7 @@ class RecurrentPPO:
         model: actor and critic, on the device.
         storage: the roll-out's buffers.
         rate: the learning rate.
-        settings: of the algorithm.
+        config: of the algorithm; the learning rate is ``rate``'s.
         peers: the other processes of the training.
     """
 
@@ -82,17 +48,18 @@ class RecurrentPPO:
         model: RecurrentActorCritic,
         storage: RecurrentStorage,
         rate: DeviceRate,
-        settings: RecurrentPpoSettings,
+        config: PpoConfig,
         peers: Peers | None = None,
     ) -> None:
-        if storage.robots % settings.minibatches:
-            raise InputError(f"num_envs {storage.robots} must be a multiple of ppo.minibatches {settings.minibatches}")
-        self.model, self.storage, self.rate, self.settings = model, storage, rate, settings
+        if storage.robots % config.minibatches:
+            raise InputError(f"num_envs {storage.robots} must be a multiple of ppo.minibatches {config.minibatches}")
+        self.model, self.storage, self.rate, self.config = model, storage, rate, config
+        self.entropy = config.entropy
         self.peers = peers or Peers()
         self.peers.share(model)
         self.device = storage.vector.device
         on_gpu = self.device.type == "cuda"
-        self._bf16 = settings.bf16 and on_gpu
+        self._bf16 = config.bf16 and on_gpu
         # one kernel for all weights; the rate lies on the device, so that no step waits for it
         self.optimizer = torch.optim.Adam(
             model.parameters(),
@@ -102,13 +69,14 @@ class RecurrentPPO:
             capturable=on_gpu,  # type: ignore[arg-type]
         )
         rate.bind(self.optimizer)
-        if settings.compiled and on_gpu:
+        if config.compiled and on_gpu:
             _compile_vision(model)
-        self._graph = StepGraph(self._learn) if settings.graphs and on_gpu and self.peers.count == 1 else None
+        self._graph = StepGraph(self._learn) if config.graphs and on_gpu and self.peers.count == 1 else None
         self._state = tuple(part.clone() for part in storage.state)
         self._fresh = torch.ones(storage.robots, dtype=torch.bool, device=self.device)
         self._sums = torch.zeros(len(_SUMS), device=self.device)
         self._kl = torch.zeros((), device=self.device)
+        self._guess_weights = guess_weights(config, self.device)
         # on the device, so that a recorded graph sees it move
         self._entropy = torch.zeros((), device=self.device)
         self._actor_share = torch.ones((), device=self.device)
@@ -122,7 +90,7 @@ class RecurrentPPO:
     @property
     def entropy_coef(self) -> float:
         """Weight of the entropy bonus."""
-        return self.settings.entropy
+        return self.entropy
 
     def let_actor_learn(self, learns: bool) -> None:
         """Whether the actor and its spread learn from the next minibatch on, or the critic's own weights alone."""
@@ -149,16 +117,16 @@ class RecurrentPPO:
     ) -> None:
         """What came of the actions: rewards (n,), dones (n,), ``time_outs`` (n,) in ``extras``."""
         st, t = self.storage, self._step
-        st.rewards[t] = rewards * self.settings.reward_scale
+        st.rewards[t] = rewards
         if "time_outs" in extras:  # an episode cut off by the clock would have gone on
-            st.rewards[t] += self.settings.gamma * st.values[t] * extras["time_outs"].float()
+            st.rewards[t] += self.config.gamma * st.values[t] * extras["time_outs"].float()
         st.done[t] = dones.bool()
         self._fresh.copy_(dones)
         self._step += 1
 
     def compute_returns(self, observation: TensorDict) -> None:
         """Advantages of the roll-out, normalised; ``observation`` is the one after its last step."""
-        st, s = self.storage, self.settings
+        st, s = self.storage, self.config
         depth = st.as_stored(observation["depth"])[None] if st.depth is not None else None
         privileged = observation["privileged"][None] if st.privileged is not None else None
         with torch.no_grad(), self._precision():
@@ -176,9 +144,9 @@ class RecurrentPPO:
         Raises:
             FloatingPointError: the loss is no longer finite.
         """
-        s, n = self.settings, self.storage.robots
+        s, n = self.config, self.storage.robots
         self._sums.zero_()
-        self._entropy.fill_(s.entropy)
+        self._entropy.fill_(self.entropy)
         for _ in range(s.epochs):
             self._kl.zero_()
             for robots in torch.randperm(n, device=self.device).chunk(s.minibatches):
@@ -255,7 +223,7 @@ class RecurrentPPO:
 
     def _learn(self, robots: Tensor) -> None:
         """One step of the optimiser on all steps of some robots."""
-        s, st, model = self.settings, self.storage, self.model
+        s, st, model = self.config, self.storage, self.model
         batch = st.take(robots)
         with self._precision():
             mean, value, _, guess = model(batch.depth, batch.vector, batch.state, batch.fresh, batch.privileged)
@@ -268,9 +236,9 @@ class RecurrentPPO:
         value_loss = torch.max((value - batch.returns).square(), (near - batch.returns).square()).mean()
         entropy = (log_std + 0.5 * (1.0 + _LOG_2PI)).sum()
         guess_loss = torch.zeros_like(entropy)
-        if batch.hidden is not None:
-            guess_loss = (guess - batch.hidden).square().mean()
-        loss = surrogate + s.value * value_loss - self._entropy * entropy + s.guess * guess_loss
+        if batch.hidden is not None and self._guess_weights is not None:
+            guess_loss = ((guess - batch.hidden).square() * self._guess_weights).sum(-1).mean()
+        loss = surrogate + s.value * value_loss - self._entropy * entropy + guess_loss
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         for weight in model.actor_parameters():
@@ -288,6 +256,18 @@ class RecurrentPPO:
             if s.adapt_each:
                 self.peers.average(kl)
                 self.rate.steer(kl)
+
+
+WAY_SIZE = 2
+"""Numbers that tell where the shortest way leads."""
+
+
+def guess_weights(config: PpoConfig, device: torch.device | str = "cpu") -> Tensor | None:
+    """Weight of the squared error of each hidden number that the feature is to tell: where the way leads, then where
+    the robot has been, each weight shared out among its numbers; None: there is nothing to tell."""
+    told = ((config.way, WAY_SIZE), (config.places, VIEW**2))
+    parts = [torch.full((size,), weight / size) for weight, size in told if weight]
+    return torch.cat(parts).to(device) if parts else None
 
 
 def _compile_vision(model: RecurrentActorCritic) -> None:
