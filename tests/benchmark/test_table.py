@@ -103,10 +103,11 @@ def test_chosen_rows_and_what_is_refused(capsys: pytest.CaptureFixture[str]) -> 
 
 def test_the_shipped_table() -> None:
     table = load_config(TableConfig, "eval/table")
-    assert len(table.rows) == 10 and table.reference == "vinl"
+    assert len(table.rows) == 11 and table.reference == "vinl"
     paper = [row for row in table.rows.values() if row.paper is not None]
     assert len(paper) == 6 and all(row.nav == "vinl/nav" for row in paper)
     assert sum(row.nav == "oracle" for row in table.rows.values()) == 3
+    assert [name for name, row in table.rows.items() if row.recovery] == ["vinl_recovery"]
     with_oracle = table.choose((), "oracle")
     assert len(with_oracle.rows) == 7  # rows that differ in the navigator alone stand once
     assert with_oracle.reference == "vinl"

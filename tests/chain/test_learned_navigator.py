@@ -15,6 +15,7 @@ from vinl.chain.config import EvaluationConfig
 from vinl.chain.navigators.base import Task
 from vinl.chain.navigators.choose import load_navigator
 from vinl.chain.navigators.learned import LearnedNavigator
+from vinl.chain.navigators.recovery import RecoveringNavigator
 from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.policies.card import locomotion_card, navigation_card
@@ -60,7 +61,8 @@ def test_goal_and_last_action_in_velocities_out(two_rooms: FloorPlan) -> None:
 @pytest.mark.parametrize("recover", [True, False])
 def test_a_robot_that_does_not_come_on_is_freed_and_the_policy_is_told(two_rooms: FloorPlan, recover: bool) -> None:
     policy = make_guide()
-    navigator = LearnedNavigator(policy, recover=recover)
+    learned = LearnedNavigator(policy)
+    navigator = RecoveringNavigator(learned) if recover else learned
     task = Task(FreeSpace(two_rooms), sample_start_goals(two_rooms, 1, np.random.default_rng(0), 2.0)[0])
     navigator.reset([task, task])
     choices = []

@@ -10,12 +10,15 @@ import numpy as np
 from vinl.chain.navigators.base import ORACLE, Navigator
 from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.chain.navigators.oracle import OracleNavigator
+from vinl.chain.navigators.recovery import RecoveringNavigator
 from vinl.policies.identity import describe_policy
 from vinl.world.floorplan import FloorPlan
 
 
 def describe_navigator(navigator: Navigator) -> dict[str, Any]:
     """Which navigator it was: the policy, or the name alone."""
+    if isinstance(navigator, RecoveringNavigator):
+        return {**describe_navigator(navigator.inner), "recovery": True}
     if isinstance(navigator, LearnedNavigator):
         return describe_policy(navigator.policy)
     if isinstance(navigator, OracleNavigator):

@@ -41,6 +41,7 @@ class RowConfig:
         loco: locomotor: a shipped policy's name, or a policy folder.
         nav: navigator: oracle, a shipped navigation policy's name, or a policy folder.
         obstacles: clutter preset.
+        recovery: free robots of the learned navigator where they are stuck.
         paper: what the paper found; none for a row that it does not have.
     """
 
@@ -48,6 +49,7 @@ class RowConfig:
     loco: str
     nav: str
     obstacles: str = "paper"
+    recovery: bool = False
     paper: PaperFigures | None = None
 
     def __post_init__(self) -> None:
@@ -104,11 +106,13 @@ class TableConfig:
         for name, row in self.rows.items():
             if names and name not in names:
                 continue
-            changed = row if nav is None or row.nav == ORACLE else replace(row, nav=nav)
+            changed = (
+                row
+                if nav is None or row.nav == ORACLE
+                else replace(row, nav=nav, recovery=row.recovery and nav != ORACLE)
+            )
             same = [
-                r
-                for r in chosen.values()
-                if (r.loco, r.nav, r.obstacles) == (changed.loco, changed.nav, changed.obstacles)
+                r for r in chosen.values() if replace(r, title="", paper=None) == replace(changed, title="", paper=None)
             ]
             if not same:
                 chosen[name] = changed

@@ -15,6 +15,7 @@ from torch import Tensor
 from vinl.chain.navigators.base import Navigator
 from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.chain.navigators.oracle import OracleNavigator
+from vinl.chain.navigators.recovery import RecoveringNavigator
 from vinl.policies.card import PolicyCard
 from vinl.policies.depth_policy import DepthNetwork, DepthPolicy, State
 from vinl.policies.networks import PolicyNetwork
@@ -109,6 +110,10 @@ def batch_policy(policy: Policy) -> Policy:
 
 def batch_navigator(navigator: Navigator) -> Navigator:
     """The navigator, its policy in safe batches if it is a learned one of a shipped kind."""
+    if isinstance(navigator, RecoveringNavigator):
+        watched = copy.copy(navigator)
+        watched.inner = batch_navigator(navigator.inner)
+        return watched
     if not is_steady_navigator(navigator) or not isinstance(navigator, LearnedNavigator):
         return navigator
     seated = copy.copy(navigator)
@@ -118,6 +123,8 @@ def batch_navigator(navigator: Navigator) -> Navigator:
 
 def is_steady_navigator(navigator: Navigator) -> bool:
     """Whether a navigator's answer for a robot depends on that robot alone, as far as we know."""
+    if isinstance(navigator, RecoveringNavigator):
+        return is_steady_navigator(navigator.inner)
     if type(navigator) is LearnedNavigator:
         return is_steady(navigator.policy)
     return type(navigator) is OracleNavigator
@@ -126,6 +133,7 @@ def is_steady_navigator(navigator: Navigator) -> bool:
 def ask_only(rows: Sequence[int], *asked: Policy | Navigator) -> None:
     """Say which robots still live; policies that are asked for all robots at any time do not care."""
     for one in asked:
+        one = one.inner if isinstance(one, RecoveringNavigator) else one
         policy = one.policy if isinstance(one, LearnedNavigator) else one
         if isinstance(policy, BatchedPolicy):
             policy.rows = rows

@@ -56,8 +56,6 @@ class EvaluationConfig:
         min_metres: episodes shorter than this do not count in the rates per metre [m] [paper: 1 m].
         sensors: errors of the depth cameras of navigator and locomotor, see ``vinl.sensing.sensor_config``.
         odometry: errors of where a learned navigator believes to be; it arrives where the goal is.
-        recovery: robots of a learned navigator that have not moved or turned for 3 s back up, turn away and walk on,
-            whatever it says (``vinl.chain.navigators.recovery``). The oracle always does so.
         oracle: how the shortest-path follower walks.
     """
 
@@ -74,7 +72,6 @@ class EvaluationConfig:
     min_metres: float = 1.0
     sensors: SensorConfig = field(default_factory=SensorConfig)
     odometry: OdometryConfig = field(default_factory=OdometryConfig)
-    recovery: bool = True
     oracle: OracleConfig = field(default_factory=OracleConfig)
 
     def __post_init__(self) -> None:

@@ -46,6 +46,9 @@ class Options:
     """Repetitions: a seed changes clutter, heading and joint angles at the start."""
     first_seed: int = 0
     """The first of the seeds."""
+    recovery: bool = False
+    """Free the robots of a learned navigator where they are stuck: they back up, turn away and walk on. No part of any
+    policy."""
     obstacles: str | None = None
     """Clutter: none (the default), paper or dense."""
     table: bool = False
@@ -133,7 +136,13 @@ def _run_one(options: Options, out: Path, prepare: Callable[[], Protocol], worke
 
     if options.rows or options.strict:
         raise InputError("--rows and --strict belong to a table; give --table too")
-    row = _load_row(options.loco or best_locomotor(), options.nav or "oracle", options.obstacles or "none", options)
+    row = _load_row(
+        options.loco or best_locomotor(),
+        options.nav or "oracle",
+        options.obstacles or "none",
+        options.recovery,
+        options,
+    )
     protocol, console = prepare(), Console()
     with _progress(console, out) as progress:
         results = evaluate_rows([row], protocol, workers, [out], True, options.fresh, command, progress.show)[0]
@@ -151,12 +160,16 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], wor
     from vinl.benchmark.table_report import print_table
     from vinl.config.loader import load_config
 
-    for name, given in (("--loco", options.loco), ("--obstacles", options.obstacles)):
+    for name, given in (
+        ("--loco", options.loco),
+        ("--obstacles", options.obstacles),
+        ("--recovery", options.recovery or None),
+    ):
         if given is not None:
             raise InputError(f"{name} does not go with --table: its rows say who walks, through what clutter")
     table = load_config(TableConfig, options.table_file).choose(options.rows, options.nav)
     present, left_out = leave_out(table, options.strict)
-    loaded = [_load_row(row.loco, row.nav, row.obstacles, options) for row in present.values()]
+    loaded = [_load_row(row.loco, row.nav, row.obstacles, row.recovery, options) for row in present.values()]
     protocol, console = prepare(), Console()
     for name, why in left_out.items():
         console.print(f"left out: row {name}: {why}", soft_wrap=True)
@@ -173,13 +186,13 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], wor
     print_table(console, write_table(out, rows, reference, left_out, command, workers, protocol.shard), out)
 
 
-def _load_row(loco: str, nav: str, obstacles: str, options: Options) -> Row:
+def _load_row(loco: str, nav: str, obstacles: str, recovery: bool, options: Options) -> Row:
     from vinl.benchmark.work import Row
     from vinl.chain.navigators.choose import load_navigator
     from vinl.policies.io import load_policy
 
     config = _load_rules(options)
-    return Row(load_policy(loco, options.device), load_navigator(nav, config, options.device), obstacles)
+    return Row(load_policy(loco, options.device), load_navigator(nav, config, options.device, recovery), obstacles)
 
 
 def _load_rules(options: Options) -> EvaluationConfig:

@@ -39,13 +39,16 @@ def best_navigator() -> str:
     return SHIPPED if SHIPPED in list_policies() else ORACLE
 
 
-def load_navigator(name: str | Path, config: EvaluationConfig, device: str = "cpu") -> Navigator:
+def load_navigator(
+    name: str | Path, config: EvaluationConfig, device: str = "cpu", recovery: bool = False
+) -> Navigator:
     """The oracle, or a trained navigator.
 
     Args:
         name: ``"oracle"``, a shipped navigation policy's name, a policy folder or the folder of a training run.
         config: how the oracle walks.
         device: of a trained navigator.
+        recovery: free its robots where they are stuck (``RecoveringNavigator``); the oracle never has that.
 
     Raises:
         InputError: there is none of that name, or it is a policy of another kind.
@@ -53,6 +56,8 @@ def load_navigator(name: str | Path, config: EvaluationConfig, device: str = "cp
     if name == ORACLE:
         from vinl.chain.navigators.oracle import OracleNavigator
 
+        if recovery:
+            raise InputError("recovery frees robots of a learned navigator; the oracle has none")
         return OracleNavigator(config.oracle)
     from vinl.chain.navigators.learned import LearnedNavigator
 
@@ -62,4 +67,10 @@ def load_navigator(name: str | Path, config: EvaluationConfig, device: str = "cp
         raise InputError(
             f"unknown navigator {str(name)!r}{closest(bare, known)}; known: {', '.join(known)}; or give a policy folder"
         )
-    return LearnedNavigator(load_policy(name, device), config.navigation_period * CONTROL_DT, config.recovery)
+    period = config.navigation_period * CONTROL_DT
+    learned = LearnedNavigator(load_policy(name, device), period)
+    if not recovery:
+        return learned
+    from vinl.chain.navigators.recovery import RecoveringNavigator
+
+    return RecoveringNavigator(learned, period)

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from vinl.chain.navigators.base import Task
-from vinl.chain.navigators.recovery import Recovery, StuckPlaces
 from vinl.chain.odometry import measure_twist
 from vinl.config.errors import InputError
 from vinl.policies.card import NAVIGATION_TABLE, PolicyCard, find_previous
@@ -18,9 +17,6 @@ from vinl.policies.velocity_range import VelocityRange
 from vinl.robot.cameras import Camera
 
 _DISTANCE_SCALE = float(NAVIGATION_TABLE[0]["scale"][0])
-
-_RECOVERY_SPEED = 0.5
-"""Forward speed of a robot that is being freed [m/s]: half of what it can do."""
 
 
 class LearnedNavigator:
@@ -33,8 +29,6 @@ class LearnedNavigator:
     Args:
         policy: observes (n, 5 or 7): distance / 5 m, cosine and sine of the bearing, and its last step; and depth.
         period: between two decisions [s].
-        recover: free robots that have not moved for a while (``Recovery``), whatever the policy says, and let it see a
-            post where they were stuck (``StuckPlaces``).
 
     Attributes:
         policy: as given.
@@ -44,7 +38,7 @@ class LearnedNavigator:
         InputError: the policy is of another kind.
     """
 
-    def __init__(self, policy: Policy, period: float = 0.5, recover: bool = True) -> None:
+    def __init__(self, policy: Policy, period: float = 0.5) -> None:
         if policy.card.kind != "navigation":
             raise InputError(
                 f"{policy.card.name} is a {policy.card.kind} policy; a navigator (--nav) is oracle or a navigation "
@@ -56,7 +50,6 @@ class LearnedNavigator:
         self._period, self._previous = period, find_previous(policy.card)
         self._last = np.zeros((0, 2), np.float32)
         self._pose: np.ndarray | None = None
-        self._recover = recover
         self.reset([])
 
     @property
@@ -69,11 +62,6 @@ class LearnedNavigator:
         self.policy.reset(len(episodes))
         self._last = np.zeros((len(episodes), 2), np.float32)
         self._pose = None
-        # walks ahead at the given speed, turns at the policy's highest rate
-        rate = float(self._range.velocity(np.ones((1, 2), np.float32))[0, 1])
-        self._recovery = Recovery(len(episodes), _RECOVERY_SPEED, rate)
-        seen = self.camera if self._recover else None
-        self._places = None if seen is None else StuckPlaces(len(episodes), seen, self._period)
 
     def act(self, observation: dict[str, Any]) -> Float[np.ndarray, "n 2"]:
         """See ``Navigator.act``; reads ``goal``, ``depth`` and, to see how far the robot came, ``pose``."""
@@ -85,20 +73,13 @@ class LearnedNavigator:
         if self._previous != "action":
             parts.append(self._measure(pose))
         vector = np.concatenate(parts, 1)
-        if self.camera is None:
-            action = self.policy.act(vector)
-        else:
-            depth = observation["depth"]
-            action = self.policy.act(vector, depth if self._places is None else self._places.draw(pose, depth))
+        action = self.policy.act(vector) if self.camera is None else self.policy.act(vector, observation["depth"])
         self._last = np.clip(np.asarray(action, np.float32), -1.0, 1.0)
-        choice = self._range.velocity(self._last)
-        if not self._recover:
-            return choice
-        choice, freed = self._recovery.correct(pose, choice)
-        if self._places is not None:
-            self._places.remember(self._recovery.found, pose)
-        self._last[freed] = self._range.action(choice[freed])
-        return choice
+        return self._range.velocity(self._last)
+
+    def overrule(self, which: Bool[np.ndarray, " n"], velocity: Float[np.ndarray, "n 2"]) -> None:
+        """These robots do something else than the policy said: that is what it knows as its last action."""
+        self._last[which] = self._range.action(velocity[which])
 
     def _measure(self, pose: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
         """The motion since the last decision in units of the action; zero at the first."""

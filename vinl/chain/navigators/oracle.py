@@ -11,7 +11,6 @@ from jaxtyping import Float
 from vinl.chain.config import OracleConfig
 from vinl.chain.navigators.base import Task
 from vinl.chain.navigators.path import Way, plan_way
-from vinl.chain.navigators.recovery import Recovery
 from vinl.config.errors import InputError
 from vinl.robot.cameras import Camera
 from vinl.robot.rotation import wrap_angle
@@ -31,14 +30,12 @@ class OracleNavigator:
         self._tasks: Sequence[Task] = []
         self._ways: list[Way] = []
         self._along: list[int] = []
-        self._recovery = Recovery(0, self.config.speed, self.config.turn_rate)
 
     def reset(self, episodes: Sequence[Task]) -> None:
         """Plan a way for every episode."""
         self._tasks = list(episodes)
         self._ways = [plan_way(task.space, task.route.start, task.route.goal) for task in self._tasks]
         self._along = [0] * len(self._tasks)
-        self._recovery = Recovery(len(self._tasks), self.config.speed, self.config.turn_rate)
 
     def act(self, observation: dict[str, Any]) -> Float[np.ndarray, "n 2"]:
         """See ``Navigator.act``; reads ``true_pose``, or ``pose`` where there is no other."""
@@ -53,7 +50,7 @@ class OracleNavigator:
         # full speed straight ahead, none at the error where it turns on the spot; slower over the last metre
         ahead = np.clip(1.0 - np.abs(error) / c.turn_in_place, 0.0, 1.0) ** 0.5
         speed = c.speed * ahead * np.clip(0.3 + 0.7 * left, 0.3, 1.0) * ease
-        return self._recovery.correct(pose, np.stack([speed, turn], 1))[0]
+        return np.stack([speed, turn], 1)
 
     def _aim(self, k: int, xy: np.ndarray) -> tuple[np.ndarray, float, float]:
         """The point of the way to head for, the length of the way that is left [m], and the share of the speed."""

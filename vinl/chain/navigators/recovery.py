@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
+from vinl.chain.navigators.base import Navigator, Task
+from vinl.policies.card import YAW_RATE
 from vinl.robot.cameras import Camera
 from vinl.robot.rotation import wrap_angle
 
@@ -25,6 +30,55 @@ _TURNED = 0.4
 
 _AWAY_M = 1.0
 """A robot that is stuck so far from where it was stuck last starts anew with the first try [m]."""
+
+_AHEAD_SPEED = 0.5
+"""Forward speed of a robot that is being freed [m/s]: half of what it can do."""
+
+
+class RecoveringNavigator:
+    """Any navigator, whose robots are freed where they are stuck: off by default, and no part of any policy.
+
+    Robots that have not moved or turned for 3 s back up, turn away and walk on, whatever the navigator says
+    (``Recovery``), and it sees a post where they were stuck (``StuckPlaces``). Both use the poses that odometry gives.
+
+    Args:
+        inner: decides while nothing is stuck. If it has a method ``overrule``, it is told which robots do something
+            else, and what.
+        period: between two decisions [s].
+
+    Attributes:
+        inner: as given.
+        camera: of the inner navigator.
+    """
+
+    def __init__(self, inner: Navigator, period: float = 0.5) -> None:
+        self.inner, self._period = inner, period
+        self.camera: Camera | None = inner.camera
+        self.reset([])
+
+    @property
+    def name(self) -> str:
+        """Of the inner navigator, and that it is freed."""
+        return f"{getattr(self.inner, 'name', type(self.inner).__name__)} with recovery"
+
+    def reset(self, episodes: Sequence[Task]) -> None:
+        """See ``Navigator.reset``."""
+        self.inner.reset(episodes)
+        self._recovery = Recovery(len(episodes), _AHEAD_SPEED, YAW_RATE[1])
+        self._places = None if self.camera is None else StuckPlaces(len(episodes), self.camera, self._period)
+
+    def act(self, observation: dict[str, Any]) -> Float[np.ndarray, "n 2"]:
+        """See ``Navigator.act``."""
+        pose = np.asarray(observation["pose"], np.float64)
+        if self._places is not None:
+            observation = observation | {"depth": self._places.draw(pose, observation["depth"])}
+        choice, freed = self._recovery.correct(pose, self.inner.act(observation))
+        if self._places is not None:
+            self._places.remember(self._recovery.found, pose)
+        overrule = getattr(self.inner, "overrule", None)
+        if overrule is not None:
+            overrule(freed, choice)
+        return choice
 
 
 class Recovery:
