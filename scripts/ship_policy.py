@@ -31,6 +31,9 @@ def clean(
     if training.get("student"):
         begun = training["student"].get("start")
         training["student"] = training["student"] | {"start": begun and Path(begun).name}
+    if training.get("lineage"):
+        *past, last = training["lineage"]
+        training["lineage"] = [*past, last | {"training": f"vinl/{name}", "commit": commit or card.commit}]
     if start is not None:
         training["from_policy"] = start
         if training.get("origin"):

@@ -95,7 +95,9 @@ def test_more_iterations_go_on_and_another_run_starts_from_the_policy(tmp_path, 
     assert main(["train-nav", "--device", "cpu", "--resume", str(first), "--iterations", "3"]) == 0
     assert [row["samples"] for row in rows(first)] == [32, 64, 96]
     assert train(small, second, "--iterations", "1", "--from", str(first), "ppo.learning_rate=2e-4") == 0
-    assert load_policy(second).card.training["origin"] == {"policy": str(first), "samples": 96}
+    training = load_policy(second).card.training
+    assert training["origin"] == {"policy": str(first), "samples": 96}
+    assert [row["samples"] for row in training["lineage"]] == [96, 32] and training["total_samples"] == 128
 
 
 def test_who_starts_from_a_run_gets_its_critic(tmp_path):

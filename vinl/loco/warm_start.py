@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
 from vinl.loco.config import LocoConfig
 from vinl.policies.card import PolicyCard, find_detour
+from vinl.policies.identity import digest_tensors
 from vinl.policies.io import find_policy, load_policy
+from vinl.policies.lineage import trace_lineage
 from vinl.policies.networks import BlindActor, MapActor
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
 
@@ -24,8 +26,9 @@ class Origin:
         policy: name on the card of the old policy.
         samples: that it had learned from.
         commit: of the code that trained it.
-        weights: first digits of the SHA-256 of its actor's weights.
+        weights: SHA-256 of its actor's weights.
         critic: whether the critic was taken over too.
+        lineage: every training behind it, see ``policies.lineage``.
     """
 
     policy: str
@@ -33,6 +36,7 @@ class Origin:
     commit: str
     weights: str
     critic: bool
+    lineage: list[dict[str, Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,9 +135,8 @@ def check_gains(name_or_path: str, card: PolicyCard, config: LocoConfig) -> None
 
 def find_origin(card: PolicyCard, network: nn.Module, critic: bool) -> Origin:
     """What the card of the new policy says about the old one."""
-    weights = network.state_dict().values()
-    digest = hashlib.sha256(b"".join(weight.cpu().numpy().tobytes() for weight in weights)).hexdigest()[:12]
-    return Origin(card.name, card.samples, card.commit, digest, critic)
+    weights = network.state_dict()
+    return Origin(card.name, card.samples, card.commit, digest_tensors(weights), critic, trace_lineage(card, weights))
 
 
 def _load_critic(name_or_path: str, config: LocoConfig) -> dict[str, Tensor] | None:

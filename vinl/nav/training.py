@@ -24,6 +24,7 @@ from vinl.nav.warm_start import build_actor, load_critic, load_start, save_criti
 from vinl.policies.card import PolicyCard, navigation_card
 from vinl.policies.commit import find_commit
 from vinl.policies.io import save_policy
+from vinl.policies.lineage import trace_lineage
 from vinl.policies.nav_actor import ACTION_SIZE, NavActor
 from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers, join_peers
@@ -85,7 +86,8 @@ def train_navigator(
     if not resume and peers.leads:
         run.create(dump_config(config))
         if start is not None:
-            run.write_origin(origin := {"policy": str(from_policy), "samples": start[1].samples})
+            known = {"policy": str(from_policy), "samples": start[1].samples}
+            run.write_origin(origin := known | {"lineage": trace_lineage(start[1], start[0])})
     if resume:
         origin = run.read_origin()
     if device.startswith("cuda"):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from torch import nn
+from torch import Tensor, nn
 
 from vinl.policies.policy import Policy
 
@@ -32,8 +33,13 @@ def describe_policy(policy: Policy) -> dict[str, Any]:
 
 
 def digest_weights(network: nn.Module) -> str:
-    """SHA-256 of all weights, by name."""
+    """SHA-256 of all weights of a network, see ``digest_tensors``."""
+    return digest_tensors(network.state_dict())
+
+
+def digest_tensors(weights: Mapping[str, Tensor]) -> str:
+    """SHA-256 of weights, by name: in single precision, as ``load_policy`` gives them."""
     digest = hashlib.sha256()
-    for name, weight in sorted(network.state_dict().items()):
-        digest.update(name.encode() + weight.detach().cpu().contiguous().numpy().tobytes())
+    for name, weight in sorted(weights.items()):
+        digest.update(name.encode() + weight.detach().cpu().float().contiguous().numpy().tobytes())
     return digest.hexdigest()

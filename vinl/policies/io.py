@@ -17,6 +17,7 @@ from vinl.config.paths import assets_dir
 from vinl.policies.card import CARD_FILE, PolicyCard, find_previous, navigation_table, read_card, write_card
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.device import choose_device
+from vinl.policies.lineage import with_lineage
 from vinl.policies.networks import PolicyNetwork, build_network
 from vinl.policies.policy import LocomotionPolicy
 from vinl.robot.observation import PROPRIOCEPTION, PROPRIOCEPTION_SIZE, TABLE
@@ -104,7 +105,7 @@ def save_policy(folder: str | Path, network: PolicyNetwork, card: PolicyCard, ha
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as scratch:
         fresh, old = Path(scratch) / "new", Path(scratch) / "old"
         fresh.mkdir()
-        write_card(fresh, card)
+        write_card(fresh, with_lineage(card, weights))
         save_file(weights, fresh / WEIGHTS_FILE)
         if folder.exists():
             folder.rename(old)
