@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from vinl.robot.cameras import LOCOMOTION_CAMERA as LOCOMOTION_CAMERA
     from vinl.robot.cameras import NAVIGATION_CAMERA as NAVIGATION_CAMERA
     from vinl.robot.cameras import Camera as Camera
+    from vinl.viewer.play import play as play
+    from vinl.viewer.play import replay as replay
     from vinl.world.blocks import Blocks as Blocks
     from vinl.world.boxes import Boxes as Boxes
     from vinl.world.floorplan import FloorPlan as FloorPlan
@@ -58,6 +60,8 @@ _WHERE = {
     "evaluate": "vinl.benchmark.evaluate",
     "generate_home": "vinl.world.homes",
     "list_policies": "vinl.policies.io",
+    "play": "vinl.viewer.play",
+    "replay": "vinl.viewer.play",
     "load_config": "vinl.config.loader",
     "load_floorplan": "vinl.world.readers",
     "load_policy": "vinl.policies.io",

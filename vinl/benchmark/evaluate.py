@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from vinl.benchmark.protocol import Films, Protocol
+from vinl.benchmark.recordings import missing_recordings
 from vinl.benchmark.store import Store
 from vinl.benchmark.work import Row, Shared, cut_jobs, film_job, list_keys, longest_first, missing_films, run_job
 from vinl.chain.choose import check_cameras, check_senses, choose_locomotor
@@ -134,7 +135,8 @@ def evaluate_rows(
         for k, (row, store) in enumerate(zip(rows, stores, strict=True)):
             known = where[k] if store.journal is not None and store.journal.resumed else None
             filmed = missing_films(wanted, protocol.films, protocol.seeds[0], folder=known)
-            missing = [key for key in wanted if key not in store.done or key in filmed]
+            unrecorded = missing_recordings(wanted, known) if protocol.record else set()
+            missing = [key for key in wanted if key not in store.done or key in filmed or key in unrecorded]
             if store.journal is not None and missing:
                 store.journal.begin(workers)
             jobs += cut_jobs(k, row, protocol.plans, routes, wanted, missing, filmed, workers)
@@ -149,7 +151,7 @@ def evaluate_rows(
 
         on_progress("walk", done, total)
         jobs = longest_first(jobs, routes)
-        shared = Shared(rows, protocol.plans, routes, protocol.config)
+        shared = Shared(rows, protocol.plans, routes, protocol.config, protocol.record)
         with Crew(min(workers, max(len(jobs), 1)), shared) as crew:
             units = crew.run(run_job, jobs, add)
             shots = [

@@ -30,6 +30,7 @@ class Protocol:
         config: limits and rules.
         shard: which share of the episodes is walked.
         films: which episodes are filmed: none, the first of every plan, or all of the first seed.
+        record: keep the poses of all episodes in files, see ``recordings``.
         routes: start/goal pairs of one's own for every plan, ``episodes`` each, see ``routes``; None: they are drawn.
     """
 
@@ -40,6 +41,7 @@ class Protocol:
     shard: Shard = field(default_factory=Shard)
     films: Films = "none"
     routes: Mapping[str, Sequence[StartGoal]] | None = None
+    record: bool = False
 
     def describe(self, row: Row) -> dict[str, Any]:
         """What the episodes of a row depend on, as plain data."""

@@ -9,7 +9,7 @@ import os
 import re
 import tempfile
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -60,11 +60,11 @@ def read_recording(folder: Path, episode: Episode) -> EpisodeTrace:
     """
     path = find_recording(folder, episode.record.key)
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             parts = {name: np.asarray(file[name], np.float64).reshape(-1, width) for name, width in _WIDTHS.items()}
     except FileNotFoundError:
         raise InputError(f"{path} is missing; walk the episode again with vinl eval --record") from None
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
         raise InputError(f"{path} is broken; delete it, and walk the episode again with vinl eval --record") from None
     rows = {len(part) for part in parts.values()}
     if len(rows) != 1 or not min(rows) or not all(np.isfinite(part).all() for part in parts.values()):
@@ -72,6 +72,22 @@ def read_recording(folder: Path, episode: Episode) -> EpisodeTrace:
     turn = parts["orientation"] / np.linalg.norm(parts["orientation"], axis=1, keepdims=True)
     poses = np.concatenate([parts["position"], turn, parts["joints"]], 1)
     return replace(episode.trace, poses=poses, commands=parts["command"])
+
+
+def without_poses(episode: Episode) -> Episode:
+    """The episode without what its recording holds."""
+    return replace(episode, trace=replace(episode.trace, poses=np.zeros((0, 19)), commands=np.zeros((0, 3))))
+
+
+def missing_recordings(wanted: Iterable[Key], folder: Path | None) -> set[Key]:
+    """The episodes that a folder has no recording of; None: a folder without any."""
+    return {key for key in wanted if folder is None or not find_recording(folder, key).is_file()}
+
+
+def forget_recordings(folder: Path) -> None:
+    """Delete the recordings of a run that begins anew: they would no longer belong to its episodes."""
+    for path in (folder / RECORDINGS).glob("*.npz"):
+        path.unlink()
 
 
 class Recordings:

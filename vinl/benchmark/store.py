@@ -9,6 +9,7 @@ from vinl.benchmark.describe import describe_navigator, describe_plan
 from vinl.benchmark.journal import Journal, read_wall_seconds
 from vinl.benchmark.metrics import aggregate_episodes
 from vinl.benchmark.protocol import Protocol
+from vinl.benchmark.recordings import forget_recordings, without_poses, write_recording
 from vinl.benchmark.work import Row, missing_films
 from vinl.chain.records import Episode, Key, Results
 from vinl.config.versions import list_packages
@@ -45,10 +46,15 @@ class Store:
                 "shard": str(protocol.shard),
             }
             self.journal = Journal(folder, about, protocol.plans, fresh)
+            if fresh:
+                forget_recordings(folder)
             self.done = self.journal.done
 
     def add(self, episode: Episode, wall: float) -> None:
         """An episode ended ``wall`` seconds after the beginning."""
+        if self._protocol.record and self._folder is not None:
+            write_recording(self._folder, episode)
+            episode = without_poses(episode)
         if self.journal is not None:
             self.journal.add(episode, wall)
         else:

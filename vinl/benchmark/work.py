@@ -48,6 +48,8 @@ class Shared:
     plans: Sequence[FloorPlan]
     routes: Sequence[list[StartGoal]]
     config: EvaluationConfig
+    record: bool = False
+    """Keep the poses of all episodes."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ def run_job(context: Context, job: Job) -> dict[Key, Episode]:
         row.locomotor,
         row.navigator,
         shared.config,
-        rows,
+        range(len(setups)) if shared.record else rows,
         (lambda _: None) if job.at_once else tell,
         context.is_stopped,
     )

@@ -63,6 +63,8 @@ class Options:
     """Film the first episode of every plan."""
     video_all: bool = False
     """Film all episodes of the first seed."""
+    record: bool = False
+    """Keep the poses of all episodes, about 1 kB for each second, for vinl play --replay."""
     workers: int | None = None
     """Processes; the number of cores by default. Results do not depend on it."""
     shard: str = "1/1"
@@ -118,7 +120,7 @@ def main(argv: list[str]) -> int:
         if options.routes is not None:
             routes = read_routes(Path(options.routes), named)
             episodes = len(next(iter(routes.values())))
-        return Protocol(named, episodes, seeds, config, shard, films, routes)
+        return Protocol(named, episodes, seeds, config, shard, films, routes, options.record)
 
     command = ["vinl", "eval", *strip_command(argv)]
     run = _run_table if options.table else _run_one

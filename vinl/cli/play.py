@@ -22,15 +22,15 @@ class Options:
     plan: str | None = None
     """Floor plan: a shipped one's name, or a file (see vinl eval); by default the first shipped one."""
     terrain: str | None = None
-    """Open ground in place of a floor plan: flat, or blocks (the test of vinl eval-loco)."""
+    """Open ground in place of a floor plan: flat, blocks, litter, or bars across a lane, 0.05 to 0.2 m high."""
     loco: Annotated[str | None, tyro.conf.arg(aliases=("--policy",))] = None
     """Locomotion policy: a shipped one's name, a policy folder or a run folder; by default the best that is shipped."""
     nav: str | None = None
     """Navigation policy: the same, or oracle (follows the shortest path); by default nav, on open ground oracle."""
     obstacles: str = "paper"
     """Clutter in a floor plan: none, paper (1 block per m2) or dense (1.5 per m2)."""
-    density: float = 1.0
-    """Blocks per m2 on open ground, 0 to 4."""
+    density: float | None = None
+    """On open ground: blocks per m2, 0 to 4 (1 by default), or objects of litter per m2, 0 to 30 (10 by default)."""
     seed: int = 0
     """Of clutter and start; the same as in vinl eval."""
     replay: str | None = None

@@ -14,7 +14,7 @@ from vinl.config.errors import InputError
 SCHEMA = 1
 """Version of ``results.json``. Names stay; new ones may be added without a new version."""
 
-_IDLE, _IDLE_FLAGS = ("--out", "--workers", "--shard"), ("--fresh",)
+_IDLE, _IDLE_FLAGS = ("--out", "--workers", "--shard"), ("--fresh", "--record")
 """Options, with a value and without, that are left out of the command."""
 
 

@@ -45,7 +45,7 @@ def play(
     seed: int = 0,
     *,
     terrain: str | None = None,
-    density: float = 1.0,
+    density: float | None = None,
     pace: float = 1.0,
     host: str = "127.0.0.1",
     port: int = 0,
@@ -61,7 +61,7 @@ def play(
         obstacles: preset of clutter in a floor plan.
         seed: of clutter and start, the same as in ``evaluate``.
         terrain: open ground in place of a plan: one of ``world.OPEN_GROUNDS``.
-        density: blocks per m2 on open ground.
+        density: blocks or objects of litter per m2 on open ground, see ``world.open_ground``.
         pace: speed of time; 1 is real time.
         host: address to listen on; ``"0.0.0.0"`` lets other machines in.
         port: to listen on; 0 for any free one.

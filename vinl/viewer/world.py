@@ -11,7 +11,8 @@ from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_routes, draw_setup
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.courses.grounds import GroundConfig, build_ground
+from vinl.courses.bars import WIDTH
+from vinl.courses.grounds import DENSITY, GroundConfig, build_ground
 from vinl.robot.aliengo import DEFAULT_POSE, KD, KP, LENGTH
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
@@ -19,14 +20,19 @@ from vinl.world.clutter import CLUTTER, ClutterPreset, scatter_blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.grid import GridFrame
 
-OPEN_GROUNDS = ("flat", "blocks")
-"""Open grounds by name: level floor, and the blocks that a locomotion policy is tested on."""
+OPEN_GROUNDS = ("flat", "blocks", "litter", "bars")
+"""Open grounds by name: level floor, blocks, litter, and a lane with bars across it that get higher."""
 
 TOO_CLOSE = LENGTH / 2 + 0.1
 """No block is put down with any part nearer to the robot's middle than this [m]."""
 
 _FENCE = 0.4
 """Height of the fence around open ground [m]."""
+
+_BARS = (0.05, 0.10, 0.15, 0.20)
+"""Heights of the bars [m], ``_BAR_EVERY`` apart, the first one so far from the start [m]; ``_BAR_DEPTH`` deep."""
+
+_BAR_EVERY, _BAR_DEPTH = 1.5, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,13 +107,13 @@ def open_home(plan: FloorPlan, obstacles: str, seed: int, config: EvaluationConf
     return World(plan, setup.blocks, np.array([*setup.route.start, setup.yaw]), setup.joints)
 
 
-def open_ground(terrain: str, seed: int, density: float = 1.0) -> World:
-    """Open ground on which ``vinl eval-loco`` tries a locomotion policy, with a fence around it.
+def open_ground(terrain: str, seed: int, density: float | None = None) -> World:
+    """Ground such as ``vinl eval-loco`` tries a locomotion policy on, with a fence around it.
 
     Args:
         terrain: one of ``OPEN_GROUNDS``.
-        seed: of the blocks.
-        density: blocks per m2.
+        seed: of blocks and litter.
+        density: blocks per m2, by default 1, or objects of litter per m2, by default 10.
 
     Raises:
         InputError: there is no such ground.
@@ -115,13 +121,24 @@ def open_ground(terrain: str, seed: int, density: float = 1.0) -> World:
     if terrain not in OPEN_GROUNDS:
         known = ", ".join(OPEN_GROUNDS)
         raise InputError(f"--terrain {terrain!r} cannot be played{closest(terrain, OPEN_GROUNDS)}; known: {known}")
-    ground = build_ground(GroundConfig(terrain, density, None, seed, KP, KD))
+    if terrain == "bars":
+        return _open_lane()
+    chosen = DENSITY.get(terrain, 1.0) if density is None else density
+    ground = build_ground(GroundConfig(terrain, chosen, None, seed, KP, KD))
     x, y = ground.homes[0, :2]
     start = np.array([x, y, 0.0])
     keep = np.ones(len(ground.blocks), bool)
     if len(ground.blocks):
         keep = ground.blocks.boxes().distances(start[None, :2])[:, 0] >= TOO_CLOSE
     return World(_fence_in(terrain, ground.field.frame), Blocks(ground.blocks.rows[keep]), start, DEFAULT_POSE.copy())
+
+
+def _open_lane() -> World:
+    """A lane as wide as the corridor of the test over bars, which the bars span."""
+    length, r = _BAR_EVERY * (len(_BARS) + 2), 0.05
+    frame = GridFrame(-_BAR_EVERY, -WIDTH / 2 - r, r, (round(WIDTH / r) + 3, round(length / r) + 1))
+    bars = [[_BAR_EVERY * (k + 1), 0.0, np.pi / 2, WIDTH, _BAR_DEPTH, height] for k, height in enumerate(_BARS)]
+    return World(_fence_in("bars", frame), Blocks(np.array(bars)), np.zeros(3), DEFAULT_POSE.copy())
 
 
 def _fence_in(name: str, frame: GridFrame) -> FloorPlan:
