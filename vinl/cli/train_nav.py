@@ -31,7 +31,7 @@ class Options:
     overrides: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
     """Settings of the config as key=value."""
     config: str = "default"
-    """default, paper, blind, compare/wide and so on (shipped configs of nav/), or a YAML file."""
+    """default, blind or paper (shipped configs of nav/), or a YAML file."""
     from_policy: Annotated[str | None, tyro.conf.arg(name="from")] = None
     """Start from the network of this navigator (a shipped name or a folder) or run; its sizes must be the config's."""
     out: str | None = None
