@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from vinl.benchmark.metrics import MIN_METRES
-from vinl.chain.metrics import BOOTSTRAP
+from vinl.chain.metrics import bootstrap_interval
 from vinl.chain.records import EpisodeRecord, Key
 
 
@@ -64,10 +64,9 @@ def difference(
     routes: dict[tuple[str, int], list[float]] = {}
     for a, b in pairs:
         routes.setdefault((a.plan, a.episode), []).append(get(a) - get(b))
-    sums = np.array([sum(values) for values in routes.values()])
-    counts = np.array([len(values) for values in routes.values()])
-    draws = np.random.Generator(np.random.Philox(0)).integers(len(sums), size=(BOOTSTRAP, len(sums)))
-    low, high = np.percentile(sums[draws].sum(1) / counts[draws].sum(1), [2.5, 97.5])
+    sums = np.array([sum(values) for values in routes.values()], np.float64)
+    counts = np.array([len(values) for values in routes.values()], np.float64)
+    low, high = bootstrap_interval(sums, counts, statistic=lambda s, c, axis: s.sum(axis) / c.sum(axis))
     return {
         "difference": round(float(sums.sum() / counts.sum()), 6),
         "ci95": [round(float(low), 6), round(float(high), 6)],
@@ -78,7 +77,5 @@ def difference(
 def mcnemar_p(only_one: int, only_other: int) -> float:
     """McNemar's exact test: how likely so uneven a split of the episodes in which only one of the two succeeded is, if
     both were equally good [two-sided binomial]."""
-    n, k = only_one + only_other, min(only_one, only_other)
-    if n == 0:
-        return 1.0
-    return min(1.0, 2 * sum(math.comb(n, i) for i in range(k + 1)) / 2**n)
+    n = only_one + only_other
+    return float(stats.binomtest(only_one, n).pvalue) if n else 1.0

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from scipy import stats
 
 BOOTSTRAP = 2000
 """Resamples of the bootstrap."""
@@ -30,21 +31,35 @@ def weigh_progress(geodesic_m: float, left_m: float, distance_m: float) -> float
 
 
 def wilson_interval(successes: int, n: int) -> tuple[float, float]:
-    """95 % Wilson interval of a share."""
+    """95 % Wilson interval of a fraction."""
     if n == 0:
         return 0.0, 1.0
-    z, p = 1.959963984540054, successes / n
-    middle, half = p + z * z / (2 * n), z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    low, high = (middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n)
-    return (0.0 if successes == 0 else low), (1.0 if successes == n else high)
-
-
-def bootstrap_interval(values: Float[np.ndarray, " n"]) -> tuple[float, float]:
-    """95 % percentile bootstrap interval of a mean over episodes; the resamples are the same in every run."""
-    rng = np.random.Generator(np.random.Philox(0))
-    draws = rng.integers(len(values), size=(BOOTSTRAP, len(values)))
-    low, high = np.percentile(values[draws].mean(1), [2.5, 97.5])
+    low, high = stats.binomtest(successes, n).proportion_ci(method="wilson")
     return float(low), float(high)
+
+
+def bootstrap_interval(
+    *samples: Float[np.ndarray, " n"], statistic: Callable[..., Any] = np.mean
+) -> tuple[float, float]:
+    """95 % percentile bootstrap interval of a statistic of paired samples; the resamples are the same in every run.
+
+    Args:
+        samples: (n,) each, drawn together.
+        statistic: of the samples, along ``axis``; their mean by default.
+    """
+    if len(samples[0]) < 2:
+        alone = float(statistic(*samples, axis=-1))
+        return alone, alone
+    found = stats.bootstrap(
+        samples,
+        statistic,
+        n_resamples=BOOTSTRAP,
+        paired=True,
+        vectorized=True,
+        method="percentile",
+        rng=np.random.Generator(np.random.Philox(0)),
+    )
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
 
 def summarise(
