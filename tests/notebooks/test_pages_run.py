@@ -9,7 +9,9 @@ import vinl
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-TAUGHT = [page for page in PAGES if page.stem in ("README", "robot") or page.stem.startswith("howto_")]
+TAUGHT = [
+    page for page in PAGES if page.stem in ("README", "index", "navigation", "robot") or page.stem.startswith("howto_")
+]
 SLOW = {"howto_train"}  # its Python trains a navigator
 
 
