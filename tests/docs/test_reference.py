@@ -51,6 +51,17 @@ def test_files_that_a_page_names_exist(page: Path) -> None:
     assert not [name for name in missing if not name.startswith(("vinl/Home-v", "vinl/Nav-v", "vinl/floorplan"))]
 
 
+def test_every_package_is_on_the_page_of_the_layout() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    packages = [path.parent.name for path in (ROOT / "vinl").glob("*/__init__.py")]
+    assert len(packages) > 10 and not [name for name in packages if f"`vinl/{name}`" not in page]
+    layers = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"][0]["layers"]
+    drawn = page.split("```mermaid")[1].split("```")[0]
+    for layer in layers:  # packages of one layer share a box
+        names = [name.removeprefix("vinl.") for name in layer.split(" | ")]
+        assert " · ".join(names) in drawn, layer
+
+
 def test_index_of_the_log_leads_to_every_page_of_it() -> None:
     index = (ROOT / "docs" / "research" / "README.md").read_text()
     pages = [page.name for page in RESEARCH if page.name != "README.md"]
