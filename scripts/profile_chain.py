@@ -22,11 +22,11 @@ import tyro
 from vinl.benchmark.work import LARGEST
 from vinl.chain.batching import BatchedPolicy, ask_only
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.depth_cameras import Eyes
+from vinl.chain.depth_cameras import DepthCameras
 from vinl.chain.episode import draw_routes, draw_setup
 from vinl.chain.navigators.oracle import OracleNavigator
-from vinl.chain.recorder import Tally
-from vinl.chain.robot import Walker
+from vinl.chain.recorder import Recorder
+from vinl.chain.robot import Robot
 from vinl.chain.rollout import run_episodes
 from vinl.chain.workers import one_thread
 from vinl.config.loader import load_config
@@ -142,9 +142,9 @@ def main() -> None:
     assert isinstance(loco, DepthPolicy) and isinstance(nav, DepthPolicy), "give policies that see"
     locomotor = Watching(loco, load_policy("teacher"))
     navigator = Guided(nav, locomotor)
-    Eyes.look = timed(lambda eyes, *_: f"{eyes.camera.name} camera", Eyes.look)
-    Walker.step = timed("physics and contacts", Walker.step)
-    Tally.count = timed("records", Tally.count)
+    DepthCameras.render = timed(lambda cameras, *_: f"{cameras.camera.name} camera", DepthCameras.render)
+    Robot.step = timed("physics and contacts", Robot.step)
+    Recorder.count = timed("records", Recorder.count)
     config, records = EvaluationConfig(), []
     began = time.process_time()
     with one_thread():

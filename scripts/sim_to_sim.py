@@ -22,9 +22,9 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from vinl.chain.choose import check_senses
+from vinl.chain.choose import check_locomotion_policy
 from vinl.chain.workers import one_thread
-from vinl.courses.block_contacts import BlockTouches
+from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import COMMANDS, Course, Start, choose_commands, command_ranges
 from vinl.courses.grounds import Ground, GroundConfig, build_ground
 from vinl.courses.herd import MAX_TILT, BoxHerd, Herd
@@ -58,7 +58,7 @@ class FieldHerd:
     def __init__(self, ground: Ground, kp: float, kd: float, n: int) -> None:
         self._simulation = Simulation(ground.field, kp, kd, ground.blocks)
         self.qpos, self.qvel = np.zeros((n, 19)), np.zeros((n, 18))
-        self.touches, self.fallen = BlockTouches.none(n), np.zeros(n, bool)
+        self.touches, self.fallen = BlockContacts.none(n), np.zeros(n, bool)
         self._warm = np.zeros((n, 18), np.float32)
         foot = self._simulation.model.geom("FL_foot").id
         self._friction = jnp.full(n, float(self._simulation.model.geom_friction[foot, 0]))
@@ -137,7 +137,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="JSON file with the figures and every robot's record")
     options = parser.parse_args()
     policy = load_policy(options.policy)
-    check_senses(policy)
+    check_locomotion_policy(policy)
     action = policy.card.action
     config = GroundConfig("blocks", options.density, None, options.seed, float(action["kp"]), float(action["kd"]))
     commands = choose_commands(options.commands, "blocks")

@@ -8,20 +8,20 @@ import pytest
 from small_home import RECORD
 
 from vinl.benchmark.metrics import aggregate_episodes
-from vinl.chain.metrics import bootstrap_interval, summarise, weigh_path, weigh_progress, wilson_interval
+from vinl.chain.metrics import bootstrap_interval, soft_spl, spl, summarise, wilson_interval
 
 
 def test_spl() -> None:
-    assert weigh_path(True, 6.0, 8.0) == pytest.approx(0.75)
-    assert weigh_path(True, 6.0, 5.8) == 1.0  # the goal has a radius: the way may be shorter than the shortest
-    assert weigh_path(False, 6.0, 8.0) == 0.0
+    assert spl(True, 6.0, 8.0) == pytest.approx(0.75)
+    assert spl(True, 6.0, 5.8) == 1.0  # the goal has a radius: the way may be shorter than the shortest
+    assert spl(False, 6.0, 8.0) == 0.0
 
 
 def test_soft_spl() -> None:
-    assert weigh_progress(6.0, 0.0, 6.0) == 1.0
-    assert weigh_progress(6.0, 3.0, 12.0) == pytest.approx(0.25)
-    assert weigh_progress(6.0, 7.0, 1.0) == 0.0
-    assert weigh_progress(6.0, math.inf, 1.0) == 0.0
+    assert soft_spl(6.0, 0.0, 6.0) == 1.0
+    assert soft_spl(6.0, 3.0, 12.0) == pytest.approx(0.25)
+    assert soft_spl(6.0, 7.0, 1.0) == 0.0
+    assert soft_spl(6.0, math.inf, 1.0) == 0.0
 
 
 def test_wilson_interval() -> None:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vinl.chain.contacts import KINDS, ContactReader
-from vinl.chain.robot import Walker
+from vinl.chain.robot import Robot
 from vinl.chain.scene import build_scene
 from vinl.robot.aliengo import DEFAULT_POSE
 from vinl.world.boxes import Boxes
@@ -17,21 +17,21 @@ NONE = Boxes.empty()
 
 def touched(walls: Boxes, blocks: Boxes, steps: int = 25) -> tuple[set[str], bool, ContactReader]:
     """Let the robot stand for a while: what it touched, whether the paper's rule was broken."""
-    walker = Walker(build_scene(walls, blocks))
-    walker.spawn(0.0, 0.0, 0.0, DEFAULT_POSE)
+    robot = Robot(build_scene(walls, blocks))
+    robot.spawn(0.0, 0.0, 0.0, DEFAULT_POSE)
     kinds, rule = set(), False
     for _ in range(steps):
-        walker.step(DEFAULT_POSE)
-        kinds |= {KINDS[k] for k in walker.contacts.touches}
-        rule |= walker.contacts.breaks_paper_rule()
-    return kinds, rule, walker.contacts
+        robot.step(DEFAULT_POSE)
+        kinds |= {KINDS[k] for k in robot.contacts.touches}
+        rule |= robot.contacts.breaks_paper_rule()
+    return kinds, rule, robot.contacts
 
 
 def feet() -> np.ndarray:
     """Where the four feet stand [m]."""
-    walker = Walker(build_scene(NONE, NONE))
-    walker.spawn(0.0, 0.0, 0.0, DEFAULT_POSE)
-    return np.array([walker.data.geom(f"{leg}_foot").xpos for leg in ("FL", "FR", "RL", "RR")])
+    robot = Robot(build_scene(NONE, NONE))
+    robot.spawn(0.0, 0.0, 0.0, DEFAULT_POSE)
+    return np.array([robot.data.geom(f"{leg}_foot").xpos for leg in ("FL", "FR", "RL", "RR")])
 
 
 def box(x: float, y: float, length: float, width: float, bottom: float, top: float) -> Boxes:
@@ -79,29 +79,29 @@ def test_low_box_escapes_the_paper_rule_only() -> None:
 
 
 def test_force_sensors_carry_the_weight() -> None:
-    walker = Walker(build_scene(NONE, NONE))
-    walker.spawn(0.0, 0.0, 0.0, DEFAULT_POSE)
+    robot = Robot(build_scene(NONE, NONE))
+    robot.spawn(0.0, 0.0, 0.0, DEFAULT_POSE)
     for _ in range(100):
-        walker.step(DEFAULT_POSE)
-    weight = float(mujoco.mj_getTotalmass(walker.model)) * 9.81
-    assert abs(walker.contacts._forces[:, 2].sum()) == pytest.approx(weight, rel=0.05)
+        robot.step(DEFAULT_POSE)
+    weight = float(mujoco.mj_getTotalmass(robot.model)) * 9.81
+    assert abs(robot.contacts._forces[:, 2].sum()) == pytest.approx(weight, rel=0.05)
 
 
 def test_lying_robot_has_fallen() -> None:
-    walker = Walker(build_scene(NONE, NONE))
-    walker.spawn(0.0, 0.0, 0.0, DEFAULT_POSE, ground=-0.35)
-    walker.step(DEFAULT_POSE)
-    assert walker.has_fallen(1.2566)
+    robot = Robot(build_scene(NONE, NONE))
+    robot.spawn(0.0, 0.0, 0.0, DEFAULT_POSE, ground=-0.35)
+    robot.step(DEFAULT_POSE)
+    assert robot.has_fallen(1.2566)
 
 
 def test_standing_on_a_height_field_is_like_standing_on_a_plane() -> None:
     field = flat_field(GridFrame(-1.0, -1.0, 0.05, (41, 41)))
     heights = []
     for ground in (None, field):
-        walker = Walker(build_scene(NONE, NONE, ground))
-        walker.spawn(0.0, 0.0, 0.3, DEFAULT_POSE)
+        robot = Robot(build_scene(NONE, NONE, ground))
+        robot.spawn(0.0, 0.0, 0.3, DEFAULT_POSE)
         for _ in range(100):
-            walker.step(DEFAULT_POSE)
-        assert not walker.has_fallen(1.2566)
-        heights.append(walker.qpos[2])
+            robot.step(DEFAULT_POSE)
+        assert not robot.has_fallen(1.2566)
+        heights.append(robot.qpos[2])
     assert heights[0] == pytest.approx(heights[1], abs=0.01)

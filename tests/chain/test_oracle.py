@@ -10,7 +10,7 @@ from vinl.chain.episode import draw_routes
 from vinl.chain.navigators.base import Task
 from vinl.chain.navigators.choose import load_navigator
 from vinl.chain.navigators.oracle import OracleNavigator
-from vinl.chain.navigators.path import plan_way
+from vinl.chain.navigators.path import plan_path
 from vinl.chain.rollout import goal_in_heading_frame
 from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
@@ -21,7 +21,7 @@ from vinl.world.readers import load_floorplan, shipped_floorplans
 
 
 def drive(plan: FloorPlan, count: int = 6) -> tuple[np.ndarray, float]:
-    """Distance to the goal at the end, and the least clearance on the way [m]."""
+    """Distance to the goal at the end, and the least clearance on the path [m]."""
     config = EvaluationConfig()
     space, routes = FreeSpace(plan), draw_routes(plan, count, config)
     oracle = OracleNavigator(config.oracle)
@@ -60,7 +60,7 @@ def test_plans_anew_when_carried_away(two_rooms: FloorPlan) -> None:
     space, route = FreeSpace(two_rooms), draw_routes(two_rooms, 1, config)[0]
     oracle = OracleNavigator()
     oracle.reset([Task(space, route)])
-    for xy in ([1.0, 5.0], [8.0, 1.0], [-3.0, -3.0]):  # the last one is outside: it keeps to its old way
+    for xy in ([1.0, 5.0], [8.0, 1.0], [-3.0, -3.0]):  # the last one is outside: it keeps to its old path
         choice = oracle.act({"pose": np.array([[*xy, 0.0]])})
         assert np.isfinite(choice).all()
 
@@ -71,12 +71,12 @@ def test_walks_around_a_gap_that_is_too_narrow(two_rooms: FloorPlan) -> None:
     rows = np.array([[x, 0.55, 0, t, 1.1, 0, 2.5], [x, 3.1, 0, t, 3.0, 0, 2.5]])
     free = two_rooms.inside & ~paint_boxes(Boxes(rows), two_rooms.frame)
     space = FreeSpace(replace(two_rooms, free=free))
-    way = plan_way(space, np.array([3.5, 1.35]), np.array([5.5, 1.35])).points
-    assert way[np.abs(way[:, 0] - x).argmin(), 1] > 4.5
-    # where there is no other way, it squeezes through
+    path = plan_path(space, np.array([3.5, 1.35]), np.array([5.5, 1.35])).points
+    assert path[np.abs(path[:, 0] - x).argmin(), 1] > 4.5
+    # where there is no other path, it squeezes through
     rows[1] = [x, 3.8, 0, t, 4.4, 0, 2.5]
     space = FreeSpace(replace(two_rooms, free=two_rooms.inside & ~paint_boxes(Boxes(rows), two_rooms.frame)))
-    squeeze = plan_way(space, np.array([3.5, 1.35]), np.array([5.5, 1.35]))
+    squeeze = plan_path(space, np.array([3.5, 1.35]), np.array([5.5, 1.35]))
     assert squeeze.points[np.abs(squeeze.points[:, 0] - x).argmin(), 1] == pytest.approx(1.35, abs=0.06)
     assert squeeze.ease.min() < 0.1
 

@@ -10,7 +10,7 @@ import torch
 
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.dead_reckoning import DeadReckoning
-from vinl.chain.depth_cameras import open_eyes
+from vinl.chain.depth_cameras import open_depth_cameras
 from vinl.chain.episode import draw_routes, draw_setups
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.chain.real_cameras import CameraErrors
@@ -31,7 +31,7 @@ CAMERA = replace(NAVIGATION_CAMERA, width=40, height=24, missing="fill")
 def look(plan: FloorPlan, config: SensorConfig, keys: list[int], walked: np.ndarray) -> torch.Tensor:
     """What the cameras give after the robots went through the poses (steps, n, 19)."""
     errors = CameraErrors(config, keys)
-    cameras = errors.put_on(open_eyes(plan, [Blocks.empty()] * len(keys), CAMERA))
+    cameras = errors.put_on(open_depth_cameras(plan, [Blocks.empty()] * len(keys), CAMERA))
     for qpos in walked:
         errors.note(qpos)
     return cameras.look(walked[-1]).clone()
@@ -44,7 +44,7 @@ def walk(n: int, steps: int = 6) -> np.ndarray:
 def test_images_are_as_old_as_drawn(two_rooms: FloorPlan) -> None:
     poses = walk(2)
     late = look(two_rooms, SensorConfig(delay=(0.06, 0.06)), [3, 4], poses)
-    ideal = open_eyes(two_rooms, [Blocks.empty()] * 2, CAMERA)
+    ideal = open_depth_cameras(two_rooms, [Blocks.empty()] * 2, CAMERA)
     torch.testing.assert_close(late, ideal.look(poses[-4]), atol=1e-5, rtol=0)
     assert not torch.allclose(late, ideal.look(poses[-1]), atol=1e-3)
 
@@ -52,7 +52,7 @@ def test_images_are_as_old_as_drawn(two_rooms: FloorPlan) -> None:
 def test_a_mount_that_is_off_moves_the_image(two_rooms: FloorPlan) -> None:
     poses = walk(8, 1)
     errors = CameraErrors(SensorConfig(roll=0.03, pitch=0.03, height=0.02), list(range(8)))
-    cameras = errors.put_on(open_eyes(two_rooms, [Blocks.empty()] * 8, CAMERA))
+    cameras = errors.put_on(open_depth_cameras(two_rooms, [Blocks.empty()] * 8, CAMERA))
     roll, pitch, height = cameras._sensor.drawn["offset"].double().numpy().T
     errors.note(poses[0])
     seen = cameras.look(poses[0])
@@ -64,7 +64,7 @@ def test_a_mount_that_is_off_moves_the_image(two_rooms: FloorPlan) -> None:
         askew = replace(CAMERA, pitch_down=CAMERA.pitch_down + pitch[k])
         pose = poses[0, k : k + 1].copy()
         pose[:, 2] += height[k]
-        level = open_eyes(two_rooms, [Blocks.empty()], askew).look(pose)
+        level = open_depth_cameras(two_rooms, [Blocks.empty()], askew).look(pose)
         assert (seen[k] - level[0]).abs().median() < 0.05  # but for the roll
 
 

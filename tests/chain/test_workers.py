@@ -6,11 +6,11 @@ import multiprocessing
 import threading
 import time
 
-from vinl.chain.workers import Context, Crew
+from vinl.chain.workers import Context, WorkerPool
 
 
 def tell_size(context: Context, job: int) -> int:
-    context.tell(job, len(context.shared))
+    context.report(job, len(context.shared))
     return job
 
 
@@ -24,9 +24,9 @@ def test_no_worker_waits_until_the_one_before_has_started() -> None:
     watch = threading.Thread(target=count)
     watch.start()
     try:
-        with Crew(workers, bytes(4_000_000)) as crew:  # more than a pipe holds, as floor plans and policies are
+        with WorkerPool(workers, bytes(4_000_000)) as pool:  # more than a pipe holds, as floor plans and policies are
             began = time.perf_counter()
-            answers = crew.run(tell_size, list(range(8)), lambda *piece: told.append((time.perf_counter(), piece)))
+            answers = pool.run(tell_size, list(range(8)), lambda *piece: told.append((time.perf_counter(), piece)))
     finally:
         over.set()
         watch.join()

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.depth_cameras import open_eyes
+from vinl.chain.depth_cameras import open_depth_cameras
 from vinl.chain.episode import EpisodeSetup, draw_routes, draw_setups
 from vinl.chain.navigators.base import Task
 from vinl.chain.navigators.learned import LearnedNavigator
-from vinl.chain.robot import Walker
+from vinl.chain.robot import Robot
 from vinl.chain.rollout import run_episodes
 from vinl.chain.scene import build_scene
 from vinl.cli.app import main
@@ -99,7 +99,7 @@ def test_its_home_is_that_of_the_chain(example: ModuleType, home: Path):
     np.testing.assert_allclose(model.body_mass[robot], wanted.body_mass[robot])
     for name in ("timestep", "integrator", "cone", "impratio", "iterations", "ls_iterations", "disableflags"):
         assert getattr(model.opt, name) == getattr(wanted.opt, name)
-    walker = Walker(wanted)
+    walker = Robot(wanted)
     walker.spawn(*setup.route.start, setup.yaw, setup.joints)
     np.testing.assert_allclose(data.qpos, walker.qpos, atol=1e-5)
 
@@ -116,7 +116,7 @@ def test_its_cameras_see_what_vinl_sees(example: ModuleType, home: Path, exporte
         assert camera is not None
         about = example.Navigation(str(exported["nav"][0])).about if name == "nav" else locomotion.about
         seen = example.DepthCamera(about["camera"]).look(model, data)
-        wanted = open_eyes(plan, [setup.blocks], camera).look(data.qpos[None].copy())[0].numpy()
+        wanted = open_depth_cameras(plan, [setup.blocks], camera).look(data.qpos[None].copy())[0].numpy()
         # home.xml has six digits: an edge may fall on the other side of a pixel's middle
         assert np.mean(np.abs(seen - wanted) < 2e-3) > 0.995
         assert seen.min() < 0.8 * seen.max()

@@ -112,7 +112,7 @@ def _feed(kind: str, numbers: range, seed: int, results: Path, pipe: Connection)
     pipe.send((-1, "done", str(time.process_time())))
 
 
-class Tally:
+class Recorder:
     """How the files of one kind were answered."""
 
     def __init__(self, kind: str) -> None:
@@ -135,7 +135,7 @@ class Tally:
         print(f"{self.kind:<12}{shown}  {self.seconds:5.1f} s of work{short}", flush=True)
 
 
-class Feeder(Tally):
+class Feeder(Recorder):
     """A process that feeds files of one kind, started again behind a file that kills or stalls it."""
 
     def __init__(self, kind: str, files: int, seed: int, results: Path) -> None:
@@ -202,9 +202,9 @@ def feed_all(kinds: list[str], files: int, seed: int, seconds: float, results: P
     return ended + running
 
 
-def feed_here(reader: Reader, files: int, seed: int, folder: Path) -> Tally:
+def feed_here(reader: Reader, files: int, seed: int, folder: Path) -> Recorder:
     """Feed files of one kind in this process, which a bad fault may end."""
-    tally, begun = Tally(reader.name), time.process_time()
+    tally, begun = Recorder(reader.name), time.process_time()
     for number in range(files):
         tally.count(number, *try_file(reader, *reader.mutant(number, seed), folder))
     tally.seconds = time.process_time() - begun

@@ -15,7 +15,7 @@ import vinl
 import vinl.gym
 from vinl.chain.batching import batch_policy
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.controller import Senses
+from vinl.chain.controller import LocomotionController
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.chain.records import plain_record
 from vinl.config.errors import InputError
@@ -123,8 +123,8 @@ def test_joints_walk_the_episode_that_evaluate_walks(monkeypatch: pytest.MonkeyP
     legs = batch_policy(policy)
     legs.reset(1)
     asked = []
-    plain = Senses.act
-    monkeypatch.setattr(Senses, "act", lambda *args: asked.append(plain(*args)) or asked[-1])
+    plain = LocomotionController.act
+    monkeypatch.setattr(LocomotionController, "act", lambda *args: asked.append(plain(*args)) or asked[-1])
     plan = vinl.load_floorplan(PLAN)
     record = vinl.evaluate([plan], policy, "oracle", 1, 1, obstacles="none", config=rules).records[0]
     env = HomeEnv(

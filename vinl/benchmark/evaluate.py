@@ -11,13 +11,13 @@ from vinl.benchmark.protocol import Films, Protocol
 from vinl.benchmark.recordings import missing_recordings
 from vinl.benchmark.store import Store
 from vinl.benchmark.work import Row, Shared, cut_jobs, film_job, list_keys, longest_first, missing_films, run_job
-from vinl.chain.choose import check_cameras, check_senses, choose_locomotor
+from vinl.chain.choose import check_cameras, check_locomotion_policy, choose_locomotor
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.navigators.base import Navigator
 from vinl.chain.navigators.choose import choose_navigator
 from vinl.chain.progress_line import show_line
 from vinl.chain.records import Episode, Results
-from vinl.chain.workers import Crew
+from vinl.chain.workers import WorkerPool
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.policies.policy import Policy
@@ -116,7 +116,7 @@ def evaluate_rows(
         InputError: a policy is no locomotor, a plan has no room for an episode, or a folder holds another evaluation.
     """
     for row in rows:
-        check_senses(row.locomotor)
+        check_locomotion_policy(row.locomotor)
         check_cameras(row.locomotor, row.navigator)
     began, workers = time.perf_counter(), max(workers, 1)
     where: Sequence[Path | None] = folders or [None] * len(rows)
@@ -152,8 +152,8 @@ def evaluate_rows(
         on_progress("walk", done, total)
         jobs = longest_first(jobs, routes)
         shared = Shared(rows, protocol.plans, routes, protocol.config, protocol.record)
-        with Crew(min(workers, max(len(jobs), 1)), shared) as crew:
-            units = crew.run(run_job, jobs, add)
+        with WorkerPool(min(workers, max(len(jobs), 1)), shared) as pool:
+            units = pool.run(run_job, jobs, add)
             shots = [
                 FilmJob(protocol.plans[job.plan], episode, str(where[job.row]))
                 for job, unit in zip(jobs, units, strict=True)
@@ -168,7 +168,7 @@ def evaluate_rows(
                     on_progress("film", shown, len(shots))
 
                 on_progress("film", 0, len(shots))
-                crew.run(film_job, shots, count)
+                pool.run(film_job, shots, count)
         wall = time.perf_counter() - began
         return [store.results(wanted, wall) for store in stores]
     finally:

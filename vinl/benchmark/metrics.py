@@ -26,15 +26,15 @@ def aggregate_episodes(records: Sequence[EpisodeRecord], min_metres: float = MIN
     """The figures of a set of episodes.
 
     Rates per metre are ratios of each episode, then averaged; only episodes of at least ``min_metres`` count in them
-    [paper]. ``falls`` is the share of episodes that ended in a fall.
+    [paper]. ``falls`` is the fraction of episodes that ended in a fall.
     """
 
-    def over(get: Callable[[EpisodeRecord], float], chosen: Sequence[EpisodeRecord], share: bool = False) -> Any:
-        return summarise([float(get(r)) for r in chosen], [r.seed for r in chosen], share)
+    def over(get: Callable[[EpisodeRecord], float], chosen: Sequence[EpisodeRecord], fraction: bool = False) -> Any:
+        return summarise([float(get(r)) for r in chosen], [r.seed for r in chosen], fraction)
 
     walked = [r for r in records if r.distance_m >= min_metres]
     figures: dict[str, Any] = {
-        "success": over(lambda r: r.success, records, share=True),
+        "success": over(lambda r: r.success, records, fraction=True),
         "spl": over(lambda r: r.spl, records),
         "soft_spl": over(lambda r: r.soft_spl, records),
         "distance_m": over(lambda r: r.distance_m, records),

@@ -20,7 +20,7 @@ def compare_rows(
     the clutter preset is the same, the same blocks.
 
     Returns:
-        ``episodes``: how many. ``success``: difference of the shares with its 95 % interval, ``only_one`` and
+        ``episodes``: how many. ``success``: difference of the fractions with its 95 % interval, ``only_one`` and
         ``only_other`` (episodes in which only that one succeeded) and ``p``, McNemar's exact test of the two.
         ``spl``, ``foot_collisions_per_m``, ``paper_foot_collisions_per_m``: mean difference with its interval and
         ``episodes``; the rates over those in which both walked at least ``min_metres``.

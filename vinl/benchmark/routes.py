@@ -58,7 +58,7 @@ def place_route(
         source: names the pair in errors.
 
     Raises:
-        InputError: one of the two is no place where the robot can be, or no way leads from one to the other.
+        InputError: one of the two is no place where the robot can be, or no path leads from one to the other.
     """
     for name, point in (("start", start), ("goal", goal)):
         why = explain_place(space, point)
@@ -69,8 +69,8 @@ def place_route(
     away = float(read_field(distance_field(space.traversable, frame, goal), frame, start))
     if not np.isfinite(away):
         raise InputError(
-            f"{source}: no way leads from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f}): they lie "
-            f"in rooms without a passage of {2 * space.radius:.2f} m between them"
+            f"{source}: no path leads from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f}): they "
+            f"lie in rooms without a passage of {2 * space.radius:.2f} m between them"
         )
     return StartGoal(start, 0.0, goal, max(away, straight), straight)
 

@@ -23,7 +23,7 @@ class PaperFigures:
 
     Attributes:
         success: share of episodes that reached the goal [%].
-        distance_m: way walked [m].
+        distance_m: path length walked [m].
         foot_collisions_per_m: by the paper's own rule [1/m].
     """
 

@@ -132,7 +132,7 @@ def run_job(context: Context, job: Job) -> dict[Key, Episode]:
     clutter = CLUTTER[row.obstacles]
     setups = [draw_setup(plan, routes[k], k, seed, clutter, shared.config) for seed, k in job.cells]
     rows = [number for number, cell in enumerate(job.cells) if cell in job.filmed]
-    tell: Callable[[Episode], None] = lambda episode: context.tell(job.row, episode)  # noqa: E731
+    tell: Callable[[Episode], None] = lambda episode: context.report(job.row, episode)  # noqa: E731
     done = run_episodes(
         plan,
         setups,
@@ -167,5 +167,5 @@ def missing_films(wanted: Sequence[Key], films: str, seed: int, folder: Path | N
 def film_job(context: Context, job: FilmJob) -> str:
     """One film, in whatever process."""
     name = film(job, context.shared.config, context.is_stopped)
-    context.tell()
+    context.report()
     return name

@@ -46,7 +46,7 @@ def choose_locomotor(locomotor: str | Path | Policy | None) -> Policy:
             f"a locomotor is a name, a folder, or has reset, act and card; got {type(policy).__name__} (functions: "
             "vinl.as_locomotor)"
         )
-    check_senses(policy)
+    check_locomotion_policy(policy)
     return policy
 
 
@@ -79,7 +79,7 @@ def check_cameras(*seeing: Any) -> None:
             )
 
 
-def check_senses(policy: Policy) -> None:
+def check_locomotion_policy(policy: Policy) -> None:
     """Refuse a policy that is no locomotor, or observes what there is not.
 
     Raises:

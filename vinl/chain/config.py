@@ -15,12 +15,12 @@ class OracleConfig:
     """How the shortest-path follower walks.
 
     Attributes:
-        speed: forward speed on a straight way [m/s].
-        look_ahead: distance along the way to the point that the robot heads for [m].
+        speed: forward speed on a straight path [m/s].
+        look_ahead: distance along the path to the point that the robot heads for [m].
         turn_gain: yaw rate for each radian of heading error [1/s].
         turn_rate: largest yaw rate [rad/s] [paper: 60 deg/s].
         turn_in_place: heading error beyond which it stops and turns [rad].
-        replan_m: distance from the planned way beyond which a new one is planned [m].
+        replan_m: distance from the planned path beyond which a new one is planned [m].
     """
 
     speed: float = 0.8

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from vinl.chain.depth_cameras import Eyes, open_eyes
-from vinl.chain.ground_map import GroundScan
+from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
+from vinl.chain.ground_map import GroundMap
 from vinl.chain.real_cameras import CameraErrors, RealCameras
 from vinl.config.errors import InputError
 from vinl.policies.card import find_detour, reads_ground
@@ -18,7 +18,7 @@ from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
 
 
-class Senses:
+class LocomotionController:
     """Asks a locomotor for the next action of all robots of a unit.
 
     A policy of 48 numbers gets only proprioception, one of 235 the height scan too; one with a camera gets
@@ -28,11 +28,11 @@ class Senses:
         locomotor: the policy.
         scan: reads the height scan that the policy observes, and bends its commands if it was trained so; None: it
             observes none.
-        eyes: renders depth; needed only by a policy with a camera.
+        cameras: renders depth; needed only by a policy with a camera.
     """
 
-    def __init__(self, locomotor: Policy, scan: GroundScan | None, eyes: Eyes | RealCameras | None) -> None:
-        self._locomotor, self._scan, self._eyes = locomotor, scan, eyes
+    def __init__(self, locomotor: Policy, scan: GroundMap | None, cameras: DepthCameras | RealCameras | None) -> None:
+        self._locomotor, self._scan, self._cameras = locomotor, scan, cameras
         self._size = locomotor.card.observation_size
 
     def act(
@@ -43,30 +43,32 @@ class Senses:
         actions: Float[np.ndarray, "n 12"],
         rows: Sequence[int] | None = None,
     ) -> Float[np.ndarray, "n 12"]:
-        """The next actions. ``rows`` are the robots that still live, see ``Eyes.look``; ``actions`` the last ones."""
+        """The next actions. ``actions`` are the last ones, ``rows`` those still alive (``DepthCameras.render``)."""
         ground = np.zeros((len(qpos), SCAN_SIZE))
         if self._scan is not None:
             ground, command = self._scan.read(qpos), self._scan.bend(qpos, command)
         observation = observe(np, qpos, qvel, command, actions, ground)[:, : self._size]
-        if self._eyes is None:
+        if self._cameras is None:
             answer = self._locomotor.act(observation)
         else:
-            answer = self._locomotor.act(observation, self._eyes.look(qpos, rows))
+            answer = self._locomotor.act(observation, self._cameras.render(qpos, rows))
         return check_actions(answer, len(qpos), self._locomotor)
 
 
-def give_senses(
+def open_controller(
     locomotor: Policy,
     plan: FloorPlan,
     blocks: Sequence[Blocks],
     ceiling: float | None = None,
     errors: CameraErrors | None = None,
-) -> Senses:
-    """The senses of robots in a floor plan, each with its own clutter, see ``open_eyes``; ``errors`` are those of their
+) -> LocomotionController:
+    """The controller of robots in a floor plan, each with its own clutter, see ``open_depth_cameras``; ``errors`` are those of their
     cameras."""
-    scan = GroundScan(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
-    eyes = None if locomotor.camera is None else open_eyes(plan, blocks, locomotor.camera, ceiling)
-    return Senses(locomotor, scan, eyes if eyes is None or errors is None else errors.put_on(eyes))
+    scan = GroundMap(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
+    cameras = None if locomotor.camera is None else open_depth_cameras(plan, blocks, locomotor.camera, ceiling)
+    return LocomotionController(
+        locomotor, scan, cameras if cameras is None or errors is None else errors.put_on(cameras)
+    )
 
 
 def check_actions(actions: np.ndarray, n: int, locomotor: Policy) -> np.ndarray:

@@ -22,7 +22,7 @@ _ON_FLOOR, _OVER_CAMERA = 0.01, 1.2
 _FLOOR_TRIANGLES = 2
 
 
-class Eyes:
+class DepthCameras:
     """A depth camera on each of n robots, on the CPU. The robots do not see each other, nor themselves.
 
     Args:
@@ -42,7 +42,7 @@ class Eyes:
         self._renders: dict[int, PreparedRender] = {}
         self._images = torch.full((len(worlds), camera.height, camera.width), camera.far)
 
-    def look(
+    def render(
         self, qpos: Float[np.ndarray, "n 19"], rows: Sequence[int] | None = None
     ) -> Float[torch.Tensor, "n height width"]:
         """Depth [m] along the optical axis, the far limit where nothing is hit.
@@ -81,8 +81,10 @@ class Eyes:
         return at, np.asarray(turned)
 
 
-def open_eyes(plan: FloorPlan, blocks: Sequence[Blocks], camera: Camera, ceiling: float | None = None) -> Eyes:
-    """Eyes of the robots of a unit in their homes: walls, furniture, floor and the clutter of each episode.
+def open_depth_cameras(
+    plan: FloorPlan, blocks: Sequence[Blocks], camera: Camera, ceiling: float | None = None
+) -> DepthCameras:
+    """DepthCameras of the robots of a unit in their homes: walls, furniture, floor and the clutter of each episode.
 
     Args:
         plan: the floor plan.
@@ -101,7 +103,7 @@ def open_eyes(plan: FloorPlan, blocks: Sequence[Blocks], camera: Camera, ceiling
             bare = len(meshes)
         worlds.append(len(meshes))
         meshes.append(seen_mesh(plan, some, ceiling))
-    return Eyes(meshes, worlds, camera, floor=0.0)
+    return DepthCameras(meshes, worlds, camera, floor=0.0)
 
 
 def seen_mesh(plan: FloorPlan, blocks: Blocks, ceiling: float | None = None) -> Mesh:

@@ -13,13 +13,13 @@ BOOTSTRAP = 2000
 """Resamples of the bootstrap."""
 
 
-def weigh_path(success: bool, geodesic_m: float, distance_m: float) -> float:
+def spl(success: bool, geodesic_m: float, distance_m: float) -> float:
     """Success weighted by path length: success x shortest / max(shortest, walked)."""
     return float(success) * geodesic_m / max(geodesic_m, distance_m, 1e-9)
 
 
-def weigh_progress(geodesic_m: float, left_m: float, distance_m: float) -> float:
-    """SoftSPL: the share of the shortest distance that was covered takes the place of success.
+def soft_spl(geodesic_m: float, left_m: float, distance_m: float) -> float:
+    """SoftSPL: the fraction of the shortest distance that was covered takes the place of success.
 
     Args:
         geodesic_m: shortest distance at the start [m].
@@ -63,17 +63,17 @@ def bootstrap_interval(
 
 
 def summarise(
-    values: Sequence[float], seeds: Sequence[int], share: bool = False
+    values: Sequence[float], seeds: Sequence[int], fraction: bool = False
 ) -> dict[str, float | list[float] | None]:
     """Mean over episodes, standard deviation of the seeds' means (divided by their number, as in the paper; None of one
-    seed), and the 95 % interval of the mean: Wilson's for a share, by bootstrap over episodes otherwise. None if there
+    seed), and the 95 % interval of the mean: Wilson's for a fraction, by bootstrap over episodes otherwise. None if there
     is no value.
     """
     if not len(values):
         return {"mean": None, "std_over_seeds": None, "ci95": None}
     v, s = np.asarray(values, np.float64), np.asarray(seeds)
     means = [v[s == seed].mean() for seed in sorted(set(seeds))]
-    interval = wilson_interval(round(v.sum()), len(v)) if share else bootstrap_interval(v)
+    interval = wilson_interval(round(v.sum()), len(v)) if fraction else bootstrap_interval(v)
     return {
         "mean": round(float(v.mean()), 6),
         "std_over_seeds": round(float(np.std(means)), 6) if len(means) > 1 else None,

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from vinl.chain.depth_cameras import Eyes
+from vinl.chain.depth_cameras import DepthCameras
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.sensing.sensor import DepthSensor
 from vinl.sensing.sensor_config import SensorConfig
@@ -40,16 +40,16 @@ class CameraErrors:
         latest = len(self._poses) - 1
         return np.stack([self._poses[max(latest - ago, 0)][k] for k, ago in enumerate(steps)])
 
-    def put_on(self, eyes: Eyes) -> RealCameras:
+    def put_on(self, cameras: DepthCameras) -> RealCameras:
         """The cameras of these robots with their errors; each camera of a robot has its own."""
-        return RealCameras(eyes, self._config, self._keys + zlib.crc32(eyes.camera.name.encode()), self)
+        return RealCameras(cameras, self._config, self._keys + zlib.crc32(cameras.camera.name.encode()), self)
 
 
 class RealCameras:
-    """What ``Eyes`` see, as real cameras give it.
+    """What ``DepthCameras`` see, as real cameras give it.
 
     Args:
-        eyes: the ideal cameras.
+        cameras: the ideal cameras.
         config: their errors.
         keys: (n,) that the random numbers follow from.
         errors: notes where the robots were.
@@ -58,9 +58,9 @@ class RealCameras:
         camera: the record of the ideal camera.
     """
 
-    def __init__(self, eyes: Eyes, config: SensorConfig, keys: np.ndarray, errors: CameraErrors) -> None:
-        n, self.camera = len(keys), eyes.camera
-        self._eyes, self._keys, self._errors = eyes, keys, errors
+    def __init__(self, cameras: DepthCameras, config: SensorConfig, keys: np.ndarray, errors: CameraErrors) -> None:
+        n, self.camera = len(keys), cameras.camera
+        self._cameras, self._keys, self._errors = cameras, keys, errors
         self._sensor = DepthSensor(config, self.camera, n)
         self._sensor.restart(_as_keys(keys), torch.ones(n, dtype=torch.bool))
         self._delay = np.round(self._sensor.drawn["delay"].numpy() / CONTROL_DT).astype(int)
@@ -85,12 +85,12 @@ class RealCameras:
         self._taken += 1
         if not chosen:
             return self._images
-        at, turned = self._eyes.place(self._errors.before(self._delay)[chosen])
+        at, turned = self._cameras.place(self._errors.before(self._delay)[chosen])
         at[:, 2] += self._raised[chosen]
-        # written out, as in Eyes.place: an image must depend on its own robot alone
+        # written out, as in DepthCameras.place: an image must depend on its own robot alone
         off = self._turned[chosen]
         turned = sum(turned[:, :, k, None] * off[:, None, k] for k in range(3))
-        ideal = self._eyes.render(chosen, at, np.asarray(turned))
+        ideal = self._cameras.render(chosen, at, np.asarray(turned))
         self._images[torch.as_tensor(chosen)] = self._sensor.spoil(
             ideal,
             torch.as_tensor(chosen, dtype=torch.int32),

@@ -8,9 +8,9 @@ from jaxtyping import Float
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import EpisodeSetup
 from vinl.chain.failures import FALL_WINDOW, find_cause
-from vinl.chain.metrics import weigh_path, weigh_progress
+from vinl.chain.metrics import soft_spl, spl
 from vinl.chain.records import Episode, EpisodeRecord, EpisodeTrace
-from vinl.chain.robot import Walker
+from vinl.chain.robot import Robot
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.world.endings import FALL, STUCK, SUCCESS, name_late_end
 from vinl.world.free_space import FreeSpace
@@ -22,7 +22,7 @@ PATH_EVERY, FILM_EVERY = 5, 2
 _FOOT, _LEG, _TRUNK = (0, 1), (2, 3), (4, 5)
 
 
-class Tally:
+class Recorder:
     """Counts one episode, step by step."""
 
     def __init__(self, setup: EpisodeSetup, space: FreeSpace, config: EvaluationConfig, film: bool) -> None:
@@ -42,17 +42,17 @@ class Tally:
             self._poses.append(qpos.copy())
             self._commands.append(command.copy())
 
-    def count(self, steps: int, walker: Walker, errors: Float[np.ndarray, "2"]) -> None:
+    def count(self, steps: int, robot: Robot, errors: Float[np.ndarray, "2"]) -> None:
         """Add what the control step brought; ``steps`` have been made by now."""
-        x, y = float(walker.qpos[0]), float(walker.qpos[1])
+        x, y = float(robot.qpos[0]), float(robot.qpos[1])
         self._distance += float(np.hypot(x - self._at[0], y - self._at[1]))
         self._at[:] = x, y
         self._errors += errors
         self._steps = steps
         if steps % PATH_EVERY == 0:
             self._path.append(self._at.copy())
-        touches, counts = walker.contacts.touches, self._counts
-        counts["paper"] += walker.contacts.breaks_paper_rule()
+        touches, counts = robot.contacts.touches, self._counts
+        counts["paper"] += robot.contacts.breaks_paper_rule()
         if touches:
             counts["foot"] += any(kind in touches for kind in _FOOT)
             counts["foot_block"] += _FOOT[0] in touches
@@ -95,8 +95,8 @@ class Tally:
             fell=self._end == FALL,
             time_s=self._steps * CONTROL_DT,
             distance_m=self._distance,
-            spl=weigh_path(success, route.geodesic_m, self._distance),
-            soft_spl=weigh_progress(route.geodesic_m, left, self._distance),
+            spl=spl(success, route.geodesic_m, self._distance),
+            soft_spl=soft_spl(route.geodesic_m, left, self._distance),
             foot_steps=counts["foot"],
             foot_block_steps=counts["foot_block"],
             foot_wall_steps=counts["foot_wall"],
@@ -105,7 +105,7 @@ class Tally:
             paper_foot_steps=counts["paper"],
             speed_rmse=float(rmse[0]),
             yaw_rate_rmse=float(rmse[1]),
-            end_at=self._blame(contacts),
+            end_at=self._find_cause(contacts),
             note=route.note,
         )
         trace = EpisodeTrace(
@@ -117,7 +117,7 @@ class Tally:
         )
         return Episode(record, trace)
 
-    def _blame(self, contacts: Float[np.ndarray, "m 4"]) -> str:
+    def _find_cause(self, contacts: Float[np.ndarray, "m 4"]) -> str:
         """What a robot fell over, or was stuck at."""
         window = {FALL: FALL_WINDOW, STUCK: self._config.stuck_window}.get(self._end)
         if window is None:

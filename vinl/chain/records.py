@@ -31,9 +31,9 @@ class EpisodeRecord:
         end_reason: one of ``endings.END_REASONS``.
         fell: ended in a fall.
         time_s: length [s].
-        distance_m: way of the trunk, summed at 50 Hz [m].
+        distance_m: path length of the trunk, summed at 50 Hz [m].
         spl: success x shortest / max(shortest, walked).
-        soft_spl: share of the shortest distance that was covered, x the same ratio.
+        soft_spl: fraction of the shortest distance that was covered, x the same ratio.
         foot_steps: at least one foot on a block or a wall.
         foot_block_steps, foot_wall_steps: the same for blocks and for walls with furniture.
         leg_contact_steps: a hip, thigh or shank on a block or a wall.

@@ -1,4 +1,4 @@
-"""One robot in its own MuJoCo data: spawn it, drive it for one action, keep the tally of its episode."""
+"""One robot in its own MuJoCo data: spawn it, drive it for one action, keep the recorder of its episode."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ACTION_LIMIT = 100.0
 """Actions are held to +- this [ViNL config]."""
 
 
-class Walker:
+class Robot:
     """A robot and what it touches. ``qpos`` and ``qvel`` are views of its state."""
 
     def __init__(self, model: mujoco.MjModel) -> None:

@@ -9,15 +9,15 @@ from jaxtyping import Float
 
 from vinl.chain.batching import ask_only, batch_navigator, batch_policy
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.controller import give_senses
+from vinl.chain.controller import open_controller
 from vinl.chain.dead_reckoning import DeadReckoning
-from vinl.chain.depth_cameras import open_eyes
+from vinl.chain.depth_cameras import open_depth_cameras
 from vinl.chain.episode import EpisodeSetup, sensor_key
 from vinl.chain.navigators.base import Navigator, Task, check_choice
 from vinl.chain.real_cameras import CameraErrors
-from vinl.chain.recorder import Tally
+from vinl.chain.recorder import Recorder
 from vinl.chain.records import Episode
-from vinl.chain.robot import Walker, joint_targets
+from vinl.chain.robot import Robot, joint_targets
 from vinl.chain.scene import build_scene
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT
@@ -58,7 +58,7 @@ def run_episodes(
     Args:
         plan: the floor plan.
         setups: the episodes.
-        locomotor: see ``Senses``.
+        locomotor: see ``LocomotionController``.
         navigator: see ``Navigator``.
         config: limits of an episode.
         filmed: rows whose poses are kept.
@@ -73,21 +73,21 @@ def run_episodes(
     locomotor, navigator = batch_policy(locomotor), batch_navigator(navigator)
     locomotor.reset(n)
     navigator.reset([Task(space, setup.route) for setup in setups])
-    walkers = _spawn_walkers(plan, setups, locomotor)
+    robots = _spawn_robots(plan, setups, locomotor)
     blocks = [setup.blocks for setup in setups]
     keys = [sensor_key(setup) for setup in setups]
     sensors = None if config.sensors.is_ideal else CameraErrors(config.sensors, keys)
-    senses = give_senses(locomotor, plan, blocks, config.ceiling, sensors)
-    eyes = None if navigator.camera is None else open_eyes(plan, blocks, navigator.camera, config.ceiling)
-    if eyes is not None and sensors is not None:
-        eyes = sensors.put_on(eyes)
+    controller = open_controller(locomotor, plan, blocks, config.ceiling, sensors)
+    cameras = None if navigator.camera is None else open_depth_cameras(plan, blocks, navigator.camera, config.ceiling)
+    if cameras is not None and sensors is not None:
+        cameras = sensors.put_on(cameras)
     reckoning = None if config.odometry.is_exact else DeadReckoning(config.odometry, keys)
     goals = np.stack([setup.route.goal for setup in setups])
-    tallies = [Tally(setup, space, config, film=k in filmed) for k, setup in enumerate(setups)]
+    recorders = [Recorder(setup, space, config, film=k in filmed) for k, setup in enumerate(setups)]
     command, choice, actions = np.zeros((n, 3)), np.zeros((n, 2)), np.zeros((n, 12), np.float32)
     alive, done = list(range(n)), dict[int, Episode]()
     ask_only(alive, locomotor, navigator)
-    qpos, qvel = np.stack([w.qpos for w in walkers]), np.stack([w.qvel for w in walkers])
+    qpos, qvel = np.stack([w.qpos for w in robots]), np.stack([w.qvel for w in robots])
     limit = round(config.time_limit / CONTROL_DT)
     for step in range(limit):
         if sensors is not None:
@@ -99,49 +99,49 @@ def run_episodes(
             believed = pose if reckoning is None else reckoning.follow(pose)
             seen = {"goal": goal_in_heading_frame(believed, goals), "previous_action": choice, "pose": believed}
             seen["true_pose"] = pose
-            if eyes is not None:
-                seen["depth"] = eyes.look(qpos, alive)
+            if cameras is not None:
+                seen["depth"] = cameras.render(qpos, alive)
             choice = check_choice(navigator.act(seen), n, navigator)
             command[:, 0], command[:, 2] = choice[:, 0], choice[:, 1]
         for k in alive:
-            tallies[k].note_pose(step, qpos[k], command[k])
-        actions = senses.act(qpos, qvel, command, actions, alive)
+            recorders[k].note_pose(step, qpos[k], command[k])
+        actions = controller.act(qpos, qvel, command, actions, alive)
         targets = joint_targets(actions, locomotor.card)
         for k in alive:
-            walkers[k].step(targets[k])
-            qpos[k], qvel[k] = walkers[k].qpos, walkers[k].qvel
+            robots[k].step(targets[k])
+            qpos[k], qvel[k] = robots[k].qpos, robots[k].qvel
         errors = tracking_errors(qpos, qvel, command)
         away = np.linalg.norm(qpos[:, :2] - goals, axis=1)
         for k in list(alive):
-            tallies[k].count(step + 1, walkers[k], errors[k])
+            recorders[k].count(step + 1, robots[k], errors[k])
             if away[k] < config.success_radius:
-                tallies[k].end("success")
-            elif walkers[k].has_fallen(config.max_tilt):
-                tallies[k].end("fall")
+                recorders[k].end("success")
+            elif robots[k].has_fallen(config.max_tilt):
+                recorders[k].end("fall")
             elif step + 1 == limit:
-                tallies[k].end_of_time()
+                recorders[k].end_of_time()
             else:
                 continue
             alive.remove(k)
-            done[k] = tallies[k].close()
+            done[k] = recorders[k].close()
             on_end(done[k])
         if not alive:
             break
     return [done[k] for k in range(n)]
 
 
-def _spawn_walkers(plan: FloorPlan, setups: Sequence[EpisodeSetup], locomotor: Policy) -> list[Walker]:
+def _spawn_robots(plan: FloorPlan, setups: Sequence[EpisodeSetup], locomotor: Policy) -> list[Robot]:
     kp, kd = (float(locomotor.card.action[key]) for key in ("kp", "kd"))
-    walkers, bare = [], None
+    robots, bare = [], None
     for setup in setups:
         if len(setup.blocks):
             model = build_scene(plan.boxes, setup.blocks.boxes(), kp=kp, kd=kd)
         else:
             model = bare = bare or build_scene(plan.boxes, Blocks.empty().boxes(), kp=kp, kd=kd)
-        walker = Walker(model)
-        walker.spawn(float(setup.route.start[0]), float(setup.route.start[1]), setup.yaw, setup.joints)
-        walkers.append(walker)
-    return walkers
+        robot = Robot(model)
+        robot.spawn(float(setup.route.start[0]), float(setup.route.start[1]), setup.yaw, setup.joints)
+        robots.append(robot)
+    return robots
 
 
 def tracking_errors(

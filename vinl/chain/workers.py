@@ -26,17 +26,17 @@ class Context:
     """What a job gets beside its own arguments.
 
     Attributes:
-        shared: what ``Crew`` was made with.
-        tell: report one finished piece of work, and hand over what it gave, if anything.
+        shared: what ``WorkerPool`` was made with.
+        report: report one finished piece of work, and hand over what it gave, if anything.
         is_stopped: whether the user wants to stop.
     """
 
     shared: Any
-    tell: Callable[..., None]
+    report: Callable[..., None]
     is_stopped: Callable[[], bool]
 
 
-class Crew:
+class WorkerPool:
     """Runs jobs ``work(context, job)`` in ``workers`` processes, or in this one if there is one worker.
 
     Torch uses one thread everywhere, so that sums are added in the same order in any process.
@@ -50,7 +50,7 @@ class Crew:
         self._workers, self._shared = workers, shared
         self._pool: ProcessPoolExecutor | None = None
 
-    def __enter__(self) -> Crew:
+    def __enter__(self) -> WorkerPool:
         if self._workers > 1:
             # spawn, not fork: forked children of a process with torch's threads may hang
             context = multiprocessing.get_context("spawn")
@@ -90,8 +90,8 @@ class Crew:
             heard += self._drain(on_piece)
             for future in done:
                 future.result()  # the first failure ends it all
-        answers, told = zip(*(future.result() for future in futures), strict=True) if futures else ((), ())
-        while heard < sum(told):  # an answer may overtake the last messages
+        answers, reported = zip(*(future.result() for future in futures), strict=True) if futures else ((), ())
+        while heard < sum(reported):  # an answer may overtake the last messages
             on_piece(*self._messages.get(timeout=PATIENCE))
             heard += 1
         return list(answers)
@@ -130,11 +130,11 @@ def _start(luggage: Any, messages: Any, stop: Any) -> None:
 def _run(work: Callable[[Context, Any], T], job: Any) -> tuple[T, int]:
     """The job's answer, and how many pieces it reported."""
     assert _context is not None
-    told, tell = 0, _context.tell
+    reported, report = 0, _context.report
 
     def count(*piece: Any) -> None:
-        nonlocal told
-        told += 1
-        tell(*piece)
+        nonlocal reported
+        reported += 1
+        report(*piece)
 
-    return work(replace(_context, tell=count), job), told
+    return work(replace(_context, report=count), job), reported

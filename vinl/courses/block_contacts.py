@@ -26,7 +26,7 @@ def bin_heights(heights: np.ndarray) -> np.ndarray:
     return np.clip(np.digitize(heights, HEIGHT_EDGES) - 1, 0, BINS - 1)
 
 
-class BlockTouches(NamedTuple):
+class BlockContacts(NamedTuple):
     """What touched blocks in one control step, robot by robot.
 
     Attributes:
@@ -44,12 +44,12 @@ class BlockTouches(NamedTuple):
     walls: Bool[np.ndarray, " n"]
 
     @classmethod
-    def none(cls, n: int) -> BlockTouches:
+    def none(cls, n: int) -> BlockContacts:
         """No touch."""
         return cls(*(np.zeros(shape, bool) for shape in ((n, 4), (n, 4), (n, BINS), (n, BINS), n, n)))
 
 
-class BlockReader(ContactReader):
+class BlockContactReader(ContactReader):
     """Also notes which feet and legs touch blocks, and blocks of what height.
 
     Args:
@@ -59,7 +59,7 @@ class BlockReader(ContactReader):
         row: the robot's row there.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, out: BlockTouches, row: int) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, out: BlockContacts, row: int) -> None:
         self._out, self._row = out, row
         names = [model.body(k).name for k in range(model.nbody)]
         is_leg = np.array([name.endswith(("_hip", "_thigh", "_calf")) for name in names])[model.geom_bodyid]

@@ -35,8 +35,8 @@ class CommandRanges:
         min_speed: slower linear commands become zero [m/s].
         hold: range of the time until the next command [s].
         hold_step: the time is rounded to multiples of this [s].
-        stand_share: share of the commands that are zero.
-        turn_share: share of the commands that only turn on the spot.
+        stand_share: fraction of the commands that are zero.
+        turn_share: fraction of the commands that only turn on the spot.
     """
 
     forward: tuple[float, float] = (-1.0, 1.0)

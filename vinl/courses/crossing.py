@@ -10,12 +10,12 @@ from jaxtyping import Bool, Float
 
 from vinl.chain.robot import joint_targets
 from vinl.courses.bars import BarConfig, draw_start
-from vinl.courses.block_contacts import BlockTouches
+from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.gait_metrics import GaitRecord, record_gait
 from vinl.courses.grounds import Ground
 from vinl.courses.herd import BoxHerd
 from vinl.courses.robot_records import FRONT, REAR
-from vinl.courses.trial import sense_ground
+from vinl.courses.trial import controller_on_course
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.rotation import yaw_of
@@ -112,7 +112,7 @@ def cross_bar(
         CrossingRecord(number, config.height, config.depth, -start.x)
         for number, start in zip(numbers, starts, strict=True)
     ]
-    herd, senses = BoxHerd(ground.model, n), sense_ground(policy, ground, n)
+    herd, controller = BoxHerd(ground.model, n), controller_on_course(policy, ground, n)
     policy.reset(n)
     for k, start in enumerate(starts):
         herd.start(k, start)
@@ -122,7 +122,7 @@ def cross_bar(
     for step in range(limit):
         if step % 50 == 0 and is_stopped():
             break
-        actions = senses.act(herd.qpos, herd.qvel, steer(herd.qpos, config.speed), actions, alive)
+        actions = controller.act(herd.qpos, herd.qvel, steer(herd.qpos, config.speed), actions, alive)
         before = herd.qpos[:, :2].copy()
         herd.step(joint_targets(actions, policy.card), alive)
         metres, touches = np.linalg.norm(herd.qpos[:, :2] - before, axis=1), herd.touches
@@ -149,7 +149,7 @@ def steer(qpos: Float[np.ndarray, "n 19"], speed: float) -> Float[np.ndarray, "n
     return np.stack([np.full(len(qpos), speed), np.zeros(len(qpos)), turn], 1)
 
 
-def _count(record: CrossingRecord, row: int, touches: BlockTouches, metres: float) -> None:
+def _count(record: CrossingRecord, row: int, touches: BlockContacts, metres: float) -> None:
     """One control step of one robot."""
     record.time_s = round(record.time_s + CONTROL_DT, 6)
     record.metres += metres

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from vinl.chain.choose import check_senses
-from vinl.chain.workers import Context, Crew
+from vinl.chain.choose import check_locomotion_policy
+from vinl.chain.workers import Context, WorkerPool
 from vinl.config.errors import InputError
 from vinl.courses.block_contacts import BINS, bin_heights
 from vinl.courses.courses import CommandRanges, Course, choose_commands, command_ranges
@@ -102,7 +102,7 @@ def compare_locomotors(
     check_locomotor_numbers(robots, seconds, seed, workers)
     chosen, density = choose_commands(commands, terrain), choose_density(density, terrain)
     for policy in policies:
-        check_senses(policy)
+        check_locomotion_policy(policy)
     grounds = [
         GroundConfig(terrain, density, level, seed, float(p.card.action["kp"]), float(p.card.action["kd"]))
         for p in policies
@@ -117,8 +117,8 @@ def compare_locomotors(
     groups = [range(first, min(first + GROUP, robots)) for first in range(0, robots, GROUP)]
     jobs = [_Job(p, group) for p in range(len(policies)) for group in groups]
     shared = _Shared(list(policies), grounds, ranges, round(seconds / CONTROL_DT))
-    with Crew(min(workers, len(jobs)), shared) as crew:
-        parts = crew.run(_run_group, jobs, count)
+    with WorkerPool(min(workers, len(jobs)), shared) as pool:
+        parts = pool.run(_run_group, jobs, count)
     wall, results = time.perf_counter() - began, []
     for p, policy in enumerate(policies):
         records = [r for job, part in zip(jobs, parts, strict=True) if job.policy == p for r in part]
@@ -130,7 +130,7 @@ def compare_locomotors(
             "seed": seed,
         }
         ground = _ground(grounds[p])
-        figures = aggregate_robots(records, height_shares(ground), ground.covered())
+        figures = aggregate_robots(records, height_fractions(ground), ground.covered())
         results.append(LocomotorResults(records, figures, {"locomotion": describe_policy(policy)}, config, wall))
     return results
 
@@ -156,8 +156,8 @@ def choose_density(density: float | None, terrain: str) -> float:
     return DENSITY.get(terrain, 1.0) if density is None else density
 
 
-def height_shares(ground: Ground) -> np.ndarray | None:
-    """(bins,) share of the blocks in every bin of height; None without blocks, and for litter, which is lower."""
+def height_fractions(ground: Ground) -> np.ndarray | None:
+    """(bins,) fraction of the blocks in every bin of height; None without blocks, and for litter, which is lower."""
     if not len(ground.blocks) or ground.among:
         return None
     return np.bincount(bin_heights(ground.blocks.rows[:, 5]), minlength=BINS) / len(ground.blocks)
@@ -177,5 +177,5 @@ def _run_group(context: Context, job: _Job) -> list[RobotRecord]:
     herd = BoxHerd(ground.model, len(courses))
     records = run_trial(herd, ground, courses, shared.policies[job.policy], context.is_stopped)
     for _ in courses:
-        context.tell()
+        context.report()
     return records

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from vinl.chain.choose import check_senses
+from vinl.chain.choose import check_locomotion_policy
 from vinl.chain.metrics import bootstrap_interval, wilson_interval
-from vinl.chain.workers import Context, Crew
+from vinl.chain.workers import Context, WorkerPool
 from vinl.config.errors import InputError
 from vinl.courses.bars import APPROACH, SPREAD, WIDTH, BarConfig, build_corridor
 from vinl.courses.crossing import PATIENCE, CrossingRecord, CrossingTrace, cross_bar
@@ -109,7 +109,7 @@ def compare_crossings(
     """
     check_crossing_numbers(heights, crossings, seed, workers)
     for policy in policies:
-        check_senses(policy)
+        check_locomotion_policy(policy)
     bars = [
         [BarConfig(h, depth, speed, seed, float(p.card.action["kp"]), float(p.card.action["kd"])) for h in heights]
         for p in policies
@@ -123,8 +123,8 @@ def compare_crossings(
 
     groups = [range(first, min(first + GROUP, crossings)) for first in range(0, crossings, GROUP)]
     jobs = [_Job(p, bar, group) for p in range(len(policies)) for bar in bars[p] for group in groups]
-    with Crew(min(workers, len(jobs)), _Shared(list(policies), traced)) as crew:
-        parts = crew.run(_run_group, jobs, count)
+    with WorkerPool(min(workers, len(jobs)), _Shared(list(policies), traced)) as pool:
+        parts = pool.run(_run_group, jobs, count)
     wall, results = time.perf_counter() - began, []
     for p, policy in enumerate(policies):
         own = [one for job, part in zip(jobs, parts, strict=True) if job.policy == p for one in part]
@@ -200,5 +200,5 @@ def _run_group(context: Context, job: _Job) -> list[tuple[CrossingRecord, Crossi
     shared: _Shared = context.shared
     done = cross_bar(shared.policies[job.policy], job.bar, _corridor(job.bar), job.numbers, context.is_stopped)
     for _ in done:
-        context.tell()
+        context.report()
     return [(c.record, c.trace if shared.traced and c.record.crossing < TRACED else None) for c in done]

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy import ndimage
 
-from vinl.chain.ground_map import GroundScan
+from vinl.chain.ground_map import GroundMap
 from vinl.chain.scene import build_scene
 from vinl.config.errors import InputError
 from vinl.sensing.depth import Mesh
@@ -125,7 +125,7 @@ class Ground:
         return self.field.labels[row, column] == BLOCK
 
     def covered(self) -> float | None:
-        """Share of the ground within reach that blocks cover; None without blocks."""
+        """Fraction of the ground within reach that blocks cover; None without blocks."""
         if not len(self.blocks):
             return None
         x, y = self.field.frame.centres()
@@ -140,7 +140,7 @@ class Ground:
         return join_meshes(box_mesh(boxes), floor_mesh(_HORIZON))
 
 
-class FieldScan(GroundScan):
+class FieldMap(GroundMap):
     """Reads the height scan of robots that all walk on one height field."""
 
     def __init__(self, field: HeightField, detour: DetourConfig | None = None) -> None:

@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vinl.chain.robot import Walker
-from vinl.courses.block_contacts import BlockTouches
+from vinl.chain.robot import Robot
+from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import Start
 from vinl.courses.strain import Strain, StrainReader
 
@@ -30,7 +30,7 @@ class Herd(Protocol):
 
     qpos: Float[np.ndarray, "n 19"]
     qvel: Float[np.ndarray, "n 18"]
-    touches: BlockTouches
+    touches: BlockContacts
     fallen: Bool[np.ndarray, " n"]
 
     @property
@@ -51,15 +51,13 @@ class BoxHerd:
     """Robots in MuJoCo C, where blocks are boxes."""
 
     def __init__(self, model: mujoco.MjModel, n: int) -> None:
-        self.touches, self._strain = BlockTouches.none(n), Strain.none(n)
+        self.touches, self._strain = BlockContacts.none(n), Strain.none(n)
         self.fallen = np.zeros(n, bool)
         self.qpos, self.qvel = np.zeros((n, 19)), np.zeros((n, 18))
-        self._walkers = [Walker(model) for _ in range(n)]
-        self._readers = [
-            StrainReader(model, w.data, self.touches, self._strain, k) for k, w in enumerate(self._walkers)
-        ]
-        for walker, reader in zip(self._walkers, self._readers, strict=True):
-            walker.contacts = reader
+        self._robots = [Robot(model) for _ in range(n)]
+        self._readers = [StrainReader(model, w.data, self.touches, self._strain, k) for k, w in enumerate(self._robots)]
+        for body, reader in zip(self._robots, self._readers, strict=True):
+            body.contacts = reader
 
     @property
     def strain(self) -> Strain:
@@ -68,18 +66,18 @@ class BoxHerd:
 
     def start(self, robot: int, start: Start) -> None:
         """Put a robot somewhere, at rest."""
-        self._walkers[robot].spawn(start.x, start.y, start.yaw, start.joints, start.ground)
+        self._robots[robot].spawn(start.x, start.y, start.yaw, start.joints, start.ground)
         self._read(robot)
 
     def step(self, targets: Float[np.ndarray, "n 12"], rows: Sequence[int] | None = None) -> None:
         """One control step to joint targets [rad], of all robots or of those named; the others stay as they are."""
-        for k in range(len(self._walkers)) if rows is None else rows:
-            walker = self._walkers[k]
-            walker.step(targets[k])
+        for k in range(len(self._robots)) if rows is None else rows:
+            body = self._robots[k]
+            body.step(targets[k])
             self._readers[k].sum_up()
-            self.fallen[k] = walker.has_fallen(MAX_TILT)
+            self.fallen[k] = body.has_fallen(MAX_TILT)
             self._read(k)
 
     def _read(self, robot: int) -> None:
-        walker = self._walkers[robot]
-        self.qpos[robot], self.qvel[robot] = walker.qpos, walker.qvel
+        body = self._robots[robot]
+        self.qpos[robot], self.qvel[robot] = body.qpos, body.qvel

@@ -53,7 +53,7 @@ class Execution:
         speed_gain, yaw_gain: achieved over commanded, with the common lag.
         speed_gain_spread, yaw_gain_spread: standard deviation of the gain from record to record.
         speed_noise: of a step's mean forward speed at full speed, in proportion to the speed [m/s].
-        speed_noise_standing: of robots told to go slower than 0.1 m/s [m/s].
+        speed_noise_standing: of robots commanded to go slower than 0.1 m/s [m/s].
         side_slip: the same of the sideways speed [m/s].
         side_drift: mean sideways speed at full speed [m/s].
         yaw_noise: of a step's mean yaw rate at full speed [rad/s].
@@ -119,9 +119,9 @@ def lag_commands(commands: Float[np.ndarray, "k n"], lag: float) -> Float[np.nda
     last = np.exp(-STEP / lag)
     mean = (1 - last) * lag / STEP
     now, means = np.zeros(commands.shape[1]), np.empty_like(commands)
-    for k, told in enumerate(commands):
-        means[k] = told + (now - told) * mean
-        now = told + (now - told) * last
+    for k, commanded in enumerate(commands):
+        means[k] = commanded + (now - commanded) * mean
+        now = commanded + (now - commanded) * last
     return means
 
 
@@ -137,16 +137,16 @@ def fit_execution(records: Sequence[MotionRecord]) -> Execution:
     done = np.concatenate([read_twists(r.poses)[_SETTLE:] for r in long])
     owner = np.concatenate([np.full(len(r.poses) - 1 - _SETTLE, k) for k, r in enumerate(long)])
 
-    def told(lag: float) -> np.ndarray:
+    def commanded(lag: float) -> np.ndarray:
         return np.concatenate([lag_commands(r.commands[:-1], lag)[_SETTLE:] for r in long])
 
     errors = np.empty((len(_LAGS), 2))
     for k, lag in enumerate(_LAGS):
         for column, axis in enumerate((0, 2)):
-            x, y = told(lag)[:, column], done[:, axis]
+            x, y = commanded(lag)[:, column], done[:, axis]
             errors[k, column] = np.mean((y - _gain(x, y) * x) ** 2)
     lag = float(_LAGS[(errors / errors.min(0)).sum(1).argmin()])
-    x = told(lag)
+    x = commanded(lag)
     gains = [_gain(x[:, 0], done[:, 0]), _gain(x[:, 1], done[:, 2])]
     spread = [[_gain(x[owner == k, c], done[owner == k, a]) for k in range(len(long))] for c, a in ((0, 0), (1, 2))]
     pace = np.clip(gains[0] * x[:, 0] / MAX_SPEED, 0, 1)

@@ -1,4 +1,4 @@
-"""The tally of each robot of a locomotor's trial, and the figures of all of them with their 95 % intervals."""
+"""The recorder of each robot of a locomotor's trial, and the figures of all of them with their 95 % intervals."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HEIGHT_NAMES = tuple(f"{a:.2f}-{b:.2f}" for a, b in pairwise(HEIGHT_EDGES))
 
 @dataclass
 class RobotRecord:
-    """One robot's tally, as it stands in ``results.json``. ``*_steps`` count control steps of 0.02 s."""
+    """One robot's recorder, as it stands in ``results.json``. ``*_steps`` count control steps of 0.02 s."""
 
     robot: int
     kind: str
@@ -57,16 +57,16 @@ class RobotRecord:
 
 def aggregate_robots(
     records: Sequence[RobotRecord],
-    height_shares: Float[np.ndarray, " bins"] | None = None,
+    height_fractions: Float[np.ndarray, " bins"] | None = None,
     covered: float | None = None,
 ) -> dict[str, Any]:
-    """The figures of all robots. ``falls`` is the share of robots that fell at least once. ``dirty_steps`` is the
+    """The figures of all robots. ``falls`` is the fraction of robots that fell at least once. ``dirty_steps`` is the
     fraction of the steps (see ``step_counter``) that touched a block. How they walked: see ``aggregate_gait``.
 
     Args:
         records: of all robots.
-        height_shares: share of the blocks in every bin of height; without blocks None.
-        covered: share of the ground that blocks cover; without blocks None.
+        height_fractions: fraction of the blocks in every bin of height; without blocks None.
+        covered: fraction of the ground that blocks cover; without blocks None.
     """
     columns = _columns(records)
     n = len(records)
@@ -109,12 +109,12 @@ def aggregate_robots(
     figures |= aggregate_gait([r.gait for r in records], figures["metres"])
     kinds = sorted({r.kind for r in records})
     figures["falls_by_kind"] = {k: float(np.mean([r.falls > 0 for r in records if r.kind == k])) for k in kinds}
-    if height_shares is not None and figures["metres"] > 0:
+    if height_fractions is not None and figures["metres"] > 0:
         for limb in ("foot", "leg"):
             steps = np.sum([getattr(r, f"{limb}_height_steps") for r in records], axis=0)
             figures[f"{limb}_block_per_m_by_height"] = {
                 name: float(count / share / figures["metres"]) if share > 0 else None
-                for name, count, share in zip(HEIGHT_NAMES, steps, height_shares, strict=True)
+                for name, count, share in zip(HEIGHT_NAMES, steps, height_fractions, strict=True)
             }
     figures["ci95"] = intervals
     return round_figures(figures)

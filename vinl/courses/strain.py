@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from vinl.chain.scene import FORCE_SENSORS, TOUCH_SENSORS
-from vinl.courses.block_contacts import BlockReader, BlockTouches
+from vinl.courses.block_contacts import BlockContactReader, BlockContacts
 from vinl.robot.aliengo import JOINT_SPEED_LIMIT, LEGS, PHYSICS_DT, SUBSTEPS
 
 
@@ -36,7 +36,7 @@ class Strain(NamedTuple):
         return cls(np.zeros(n), np.zeros(n), np.zeros(n, bool), np.zeros(n, bool), np.zeros((n, 4), bool))
 
 
-class StrainReader(BlockReader):
+class StrainReader(BlockContactReader):
     """Also notes torques, joint speeds, forces on the feet and where the robot touches itself.
 
     Args:
@@ -48,7 +48,7 @@ class StrainReader(BlockReader):
     """
 
     def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, touches: BlockTouches, strain: Strain, row: int
+        self, model: mujoco.MjModel, data: mujoco.MjData, touches: BlockContacts, strain: Strain, row: int
     ) -> None:
         bodies = [model.body(k).name.split("_")[0] for k in range(model.nbody)]
         self._leg_of = np.array([LEGS.index(name) if name in LEGS else -1 for name in bodies])[model.geom_bodyid]

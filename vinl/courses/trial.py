@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vinl.chain.controller import Senses
-from vinl.chain.depth_cameras import Eyes
+from vinl.chain.controller import LocomotionController
+from vinl.chain.depth_cameras import DepthCameras
 from vinl.chain.robot import joint_targets
-from vinl.courses.block_contacts import BlockTouches
+from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import Course
 from vinl.courses.gait_metrics import record_gait
-from vinl.courses.grounds import FieldScan, Ground
+from vinl.courses.grounds import FieldMap, Ground
 from vinl.courses.herd import Herd
 from vinl.courses.robot_records import FRONT, REAR, RobotRecord
 from vinl.courses.step_counter import StepCounter
@@ -53,7 +53,7 @@ def run_trial(
     records = [_new_record(ground, course) for course in courses]
     homes = np.array([ground.homes[course.home, :2] for course in courses])
     commands, fresh = np.stack([c.commands for c in courses], 1), np.stack([c.fresh for c in courses], 1)
-    senses = sense_ground(policy, ground, n)
+    controller = controller_on_course(policy, ground, n)
     policy.reset(n)
     for k, course in enumerate(courses):
         herd.start(k, course.draw_start())
@@ -63,7 +63,7 @@ def run_trial(
         if step % SETTLED == 0 and is_stopped():
             break
         age[fresh[step]] = 0
-        actions = senses.act(herd.qpos, herd.qvel, commands[step], actions)
+        actions = controller.act(herd.qpos, herd.qvel, commands[step], actions)
         before = herd.qpos[:, :2].copy()
         herd.step(joint_targets(actions, policy.card))
         metres = np.linalg.norm(herd.qpos[:, :2] - before, axis=1)
@@ -90,11 +90,11 @@ def run_trial(
     return records
 
 
-def sense_ground(policy: Policy, ground: Ground, n: int) -> Senses:
+def controller_on_course(policy: Policy, ground: Ground, n: int) -> LocomotionController:
     """What a policy of n robots observes on a ground that all of them walk on."""
-    scan = FieldScan(ground.field, find_detour(policy.card)) if reads_ground(policy.card) else None
-    eyes = None if policy.camera is None else Eyes([ground.mesh()], [0] * n, policy.camera)
-    return Senses(policy, scan, eyes)
+    scan = FieldMap(ground.field, find_detour(policy.card)) if reads_ground(policy.card) else None
+    cameras = None if policy.camera is None else DepthCameras([ground.mesh()], [0] * n, policy.camera)
+    return LocomotionController(policy, scan, cameras)
 
 
 def _new_record(ground: Ground, course: Course) -> RobotRecord:
@@ -104,7 +104,7 @@ def _new_record(ground: Ground, course: Course) -> RobotRecord:
 
 def _add_touches(
     records: Sequence[RobotRecord],
-    touches: BlockTouches,
+    touches: BlockContacts,
     metres: Float[np.ndarray, " n"],
     fallen: Bool[np.ndarray, " n"],
 ) -> None:

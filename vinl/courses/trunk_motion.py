@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from vinl.chain.choose import check_senses
-from vinl.chain.controller import give_senses
-from vinl.chain.robot import Walker, joint_targets
+from vinl.chain.choose import check_locomotion_policy
+from vinl.chain.controller import open_controller
+from vinl.chain.robot import Robot, joint_targets
 from vinl.chain.scene import build_scene
-from vinl.chain.workers import Context, Crew
+from vinl.chain.workers import Context, WorkerPool
 from vinl.config.errors import InputError
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
@@ -72,14 +72,14 @@ def record_motion(
     Raises:
         InputError: an unknown preset, a number out of range, or a policy that is no locomotor.
     """
-    check_senses(policy)
+    check_locomotion_policy(policy)
     if clutter not in CLUTTER:
         raise InputError(f"clutter {clutter!r} is not a preset; known: {', '.join(CLUTTER)}")
     if robots < 1 or not 2 <= seconds <= 3600:
         raise InputError(f"at least one robot and 2 to 3600 s, got {robots} and {seconds:g}")
     jobs = [range(first, min(first + GROUP, robots)) for first in range(0, robots, GROUP)]
-    with Crew(min(workers, len(jobs)), (policy, clutter, round(seconds / CONTROL_DT), seed)) as crew:
-        return [record for group in crew.run(_record_group, jobs, lambda: None) for record in group]
+    with WorkerPool(min(workers, len(jobs)), (policy, clutter, round(seconds / CONTROL_DT), seed)) as pool:
+        return [record for group in pool.run(_record_group, jobs, lambda: None) for record in group]
 
 
 def draw_commands(rng: np.random.Generator, count: int) -> Float[np.ndarray, "count 2"]:
@@ -117,13 +117,13 @@ def _record_group(context: Context, robots: range) -> list[MotionRecord]:
     blocks = scatter_blocks(plan, CLUTTER[clutter], scatter, starts[:, :2])
     kp, kd = (float(policy.card.action[key]) for key in ("kp", "kd"))
     model = build_scene(plan.boxes, blocks.boxes(), kp=kp, kd=kd)
-    walkers = [Walker(model) for _ in robots]
-    for walker, (x, y, yaw), rng in zip(walkers, starts, rngs, strict=True):
-        walker.spawn(float(x), float(y), float(yaw), DEFAULT_POSE + rng.uniform(-0.05, 0.05, 12))
-    senses = give_senses(policy, plan, [blocks] * n)
+    bodies = [Robot(model) for _ in robots]
+    for body, (x, y, yaw), rng in zip(bodies, starts, rngs, strict=True):
+        body.spawn(float(x), float(y), float(yaw), DEFAULT_POSE + rng.uniform(-0.05, 0.05, 12))
+    controller = open_controller(policy, plan, [blocks] * n)
     policy.reset(n)
     command, actions = np.zeros((n, 3)), np.zeros((n, 12), np.float32)
-    qpos, qvel = np.stack([w.qpos for w in walkers]), np.stack([w.qvel for w in walkers])
+    qpos, qvel = np.stack([w.qpos for w in bodies]), np.stack([w.qvel for w in bodies])
     history, length, fell = [], np.full(n, steps // PERIOD), np.zeros(n, bool)
     alive = list(range(n))
     for step in range(steps):
@@ -133,13 +133,13 @@ def _record_group(context: Context, robots: range) -> list[MotionRecord]:
             k = step // PERIOD
             history.append(_read_trunk(qpos))
             command[:, 0], command[:, 2] = orders[:, k].T
-        actions = senses.act(qpos, qvel, command, actions, alive)
+        actions = controller.act(qpos, qvel, command, actions, alive)
         targets = joint_targets(actions, policy.card)
         for k in list(alive):
-            walkers[k].step(targets[k])
-            qpos[k], qvel[k] = walkers[k].qpos, walkers[k].qvel
+            bodies[k].step(targets[k])
+            qpos[k], qvel[k] = bodies[k].qpos, bodies[k].qvel
             out = np.abs(qpos[k, :2]).max() > _HALF - 1.5
-            if out or walkers[k].has_fallen(_MAX_TILT):
+            if out or bodies[k].has_fallen(_MAX_TILT):
                 fell[k] = not out
                 length[k] = max(step // PERIOD - (0 if out else 2), 0)  # the tumble is no walking
                 alive.remove(k)

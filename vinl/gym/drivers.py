@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from vinl.chain.batching import batch_navigator, batch_policy
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.controller import give_senses
-from vinl.chain.depth_cameras import Eyes, open_eyes
+from vinl.chain.controller import open_controller
+from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.chain.navigators.base import Navigator, check_choice
 from vinl.chain.navigators.choose import load_navigator
 from vinl.chain.robot import joint_targets
@@ -32,12 +32,12 @@ class Legs:
     def enter(self, trip: Trip, ceiling: float | None) -> None:
         """A new episode begins."""
         self._policy.reset(1)
-        self._senses = give_senses(self._policy, trip.task.space.plan, [trip.setup.blocks], ceiling)
+        self._observation = open_controller(self._policy, trip.task.space.plan, [trip.setup.blocks], ceiling)
         self._last = np.zeros((1, 12), np.float32)
 
     def choose(self, trip: Trip, command: Float[np.ndarray, "1 3"]) -> Float[np.ndarray, "12"]:
         """Joint targets [rad] of the next control step."""
-        self._last = self._senses.act(trip.qpos, trip.qvel, command, self._last, [0])
+        self._last = self._observation.act(trip.qpos, trip.qvel, command, self._last, [0])
         return joint_targets(self._last, self._policy.card)[0]
 
 
@@ -47,7 +47,7 @@ class Guide:
     def __init__(self, navigator: str | Path | Navigator, rules: EvaluationConfig) -> None:
         by_name = isinstance(navigator, (str, Path))
         self._navigator = batch_navigator(load_navigator(navigator, rules) if by_name else navigator)
-        self._eyes: Eyes | None = None
+        self._cameras: DepthCameras | None = None
 
     def enter(self, trip: Trip, ceiling: float | None) -> None:
         """A new episode begins."""
@@ -55,12 +55,12 @@ class Guide:
         self._last = np.zeros((1, 2))
         camera = self._navigator.camera
         plan, blocks = trip.task.space.plan, [trip.setup.blocks]
-        self._eyes = None if camera is None else open_eyes(plan, blocks, camera, ceiling)
+        self._cameras = None if camera is None else open_depth_cameras(plan, blocks, camera, ceiling)
 
     def choose(self, trip: Trip) -> Float[np.ndarray, "2"]:
         """Forward speed [m/s] and yaw rate [rad/s] of the next half second."""
         seen = {"goal": trip.goal, "previous_action": self._last, "pose": trip.pose}
-        if self._eyes is not None:
-            seen["depth"] = self._eyes.look(trip.qpos, [0])
+        if self._cameras is not None:
+            seen["depth"] = self._cameras.render(trip.qpos, [0])
         self._last = check_choice(self._navigator.act(seen), 1, self._navigator)
         return self._last[0]

@@ -23,7 +23,7 @@ from vinl.config.loader import load_config
 from vinl.gym.actions import JOINT_REACH, check_action, joint_target_of
 from vinl.gym.chase import ChaseView
 from vinl.gym.drivers import Guide, Legs
-from vinl.gym.senses import AgentSenses, Cameras, choose_cameras
+from vinl.gym.observations import AgentObservation, Cameras, choose_cameras
 from vinl.gym.trip import Trip
 from vinl.nav.config import NavConfig
 from vinl.policies.card import navigation_table
@@ -128,8 +128,8 @@ class HomeEnv(gymnasium.Env):
         camera = None if navigation.camera is None else navigation.camera.record()
         chosen = choose_cameras(cameras, self._joints, camera)
         self._steps = 12 if self._joints else sum(row["size"] for row in navigation_table(self._knows)[2:])
-        self._senses = AgentSenses(self._joints, chosen, height_scan, self._steps)
-        self.observation_space = self._senses.space
+        self._observation = AgentObservation(self._joints, chosen, height_scan, self._steps)
+        self.observation_space = self._observation.space
         self.action_space = spaces.Box(-1.0, 1.0, (12 if self._joints else 2,), np.float32)
         rate = 1 / CONTROL_DT / (1 if self._joints else self._rules.navigation_period)
         self.metadata = {**self.metadata, "render_fps": round(rate)}
@@ -153,13 +153,13 @@ class HomeEnv(gymnasium.Env):
         self.trip = trip = Trip(space, setup, self._rules, *gains)
         self._command, self._view = np.zeros((1, 3)), None
         self._previous = np.zeros((1, self._steps), np.float32)
-        self._senses.enter(trip, self._rules.ceiling)
+        self._observation.enter(trip, self._rules.ceiling)
         for driver in (self._legs, self._guide):
             if driver is not None:
                 driver.enter(trip, self._rules.ceiling)
         with one_thread():
             self._decide()
-            return self._senses.observe(trip, self._command, self._previous), self._info(trip)
+            return self._observation.observe(trip, self._command, self._previous), self._info(trip)
 
     def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         """One decision of the agent.
@@ -176,7 +176,7 @@ class HomeEnv(gymnasium.Env):
             touched = self._move_joints(trip, chosen) if self._joints else self._walk(trip, chosen)
             if not trip.end:
                 self._decide()
-            observation = self._senses.observe(trip, self._command, self._previous)
+            observation = self._observation.observe(trip, self._command, self._previous)
         r, share = self._reward, 1.0 / self._rules.navigation_period if self._joints else 1.0
         reward = r.progress * trip.measure_way() + share * (r.slack + r.collision * touched)
         reward += r.success * (trip.end == "success")

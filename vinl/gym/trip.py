@@ -9,9 +9,9 @@ from vinl.chain.config import EvaluationConfig
 from vinl.chain.contacts import KINDS
 from vinl.chain.episode import EpisodeSetup
 from vinl.chain.navigators.base import Task
-from vinl.chain.recorder import Tally
+from vinl.chain.recorder import Recorder
 from vinl.chain.records import Episode
-from vinl.chain.robot import Walker
+from vinl.chain.robot import Robot
 from vinl.chain.rollout import goal_in_heading_frame, tracking_errors
 from vinl.chain.scene import build_scene
 from vinl.robot.aliengo import CONTROL_DT, KD, KP
@@ -36,7 +36,7 @@ class Trip:
     Attributes:
         task: free floor and route, what an oracle may know.
         setup: start, goal and clutter.
-        walker: the robot.
+        robot: the robot.
         steps: control steps of 0.02 s made.
         foot_steps: those in which a foot was on a block, a wall or furniture.
         touched_wall: whether the last control step touched a wall or furniture with any part.
@@ -48,9 +48,9 @@ class Trip:
         self, space: FreeSpace, setup: EpisodeSetup, rules: EvaluationConfig, kp: float = KP, kd: float = KD
     ) -> None:
         self.task, self.setup, self._rules = Task(space, setup.route), setup, rules
-        self.walker = Walker(build_scene(space.plan.boxes, setup.blocks.boxes(), kp=kp, kd=kd))
-        self.walker.spawn(float(setup.route.start[0]), float(setup.route.start[1]), setup.yaw, setup.joints)
-        self._tally = Tally(setup, space, rules, film=False)
+        self.robot = Robot(build_scene(space.plan.boxes, setup.blocks.boxes(), kp=kp, kd=kd))
+        self.robot.spawn(float(setup.route.start[0]), float(setup.route.start[1]), setup.yaw, setup.joints)
+        self._tally = Recorder(setup, space, rules, film=False)
         self._field = distance_field(space.traversable, space.plan.frame, setup.route.goal)
         self._limit = round(rules.time_limit / CONTROL_DT)
         self.steps, self.foot_steps, self.touched_wall, self.end = 0, 0, False, ""
@@ -60,12 +60,12 @@ class Trip:
     @property
     def qpos(self) -> Float[np.ndarray, "1 19"]:
         """Generalised position, as a batch of one; a copy."""
-        return self.walker.qpos[None].copy()
+        return self.robot.qpos[None].copy()
 
     @property
     def qvel(self) -> Float[np.ndarray, "1 18"]:
         """Generalised velocity, as a batch of one; a copy."""
-        return self.walker.qvel[None].copy()
+        return self.robot.qvel[None].copy()
 
     @property
     def pose(self) -> Float[np.ndarray, "1 3"]:
@@ -80,7 +80,7 @@ class Trip:
 
     def measure_way(self) -> float:
         """How much nearer the goal has come on foot since the last call [m]; updates ``geodesic_m``."""
-        now = float(read_field(self._field, self.task.space.plan.frame, self.walker.qpos[:2]))
+        now = float(read_field(self._field, self.task.space.plan.frame, self.robot.qpos[:2]))
         before, self.geodesic_m = self.geodesic_m, now if np.isfinite(now) else self.geodesic_m
         return before - self.geodesic_m
 
@@ -91,16 +91,16 @@ class Trip:
             target: of the joints.
             command: velocities that the robot was to have, for the errors in the record.
         """
-        self._tally.note_pose(self.steps, self.walker.qpos, command[0])
-        self.walker.step(target)
+        self._tally.note_pose(self.steps, self.robot.qpos, command[0])
+        self.robot.step(target)
         self.steps += 1
-        self._tally.count(self.steps, self.walker, tracking_errors(self.qpos, self.qvel, command)[0])
-        touched = self.walker.contacts.touches.keys()
+        self._tally.count(self.steps, self.robot, tracking_errors(self.qpos, self.qvel, command)[0])
+        touched = self.robot.contacts.touches.keys()
         self.foot_steps += bool(_FEET & touched)
         self.touched_wall = bool(_WALLS & touched)
-        if np.linalg.norm(self.walker.qpos[:2] - self.setup.route.goal) < self._rules.success_radius:
+        if np.linalg.norm(self.robot.qpos[:2] - self.setup.route.goal) < self._rules.success_radius:
             self._end("success")
-        elif self.walker.has_fallen(self._rules.max_tilt):
+        elif self.robot.has_fallen(self._rules.max_tilt):
             self._end("fall")
         elif self.steps == self._limit:
             self._tally.end_of_time()

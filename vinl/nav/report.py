@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from vinl.chain.metrics import summarise
-from vinl.render.drawing import draw_histogram, keep_low, outline_boxes, outline_way
+from vinl.render.drawing import draw_histogram, keep_low, outline_boxes, outline_path
 from vinl.robot.aliengo import LENGTH
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
@@ -33,11 +33,11 @@ def aggregate_navigation(records: Sequence[Any], reasons: Iterable[str]) -> dict
     ``collisions`` are cancelled steps of an episode, ``time_s`` is over all episodes.
     """
 
-    def over(get: Callable[[Any], float], share: bool = False) -> dict[str, Any]:
-        figure = summarise([float(get(r)) for r in records], [r.seed for r in records], share)
+    def over(get: Callable[[Any], float], fraction: bool = False) -> dict[str, Any]:
+        figure = summarise([float(get(r)) for r in records], [r.seed for r in records], fraction)
         return {key: figure[key] for key in ("mean", "ci95")}
 
-    figures: dict[str, Any] = {"success": over(lambda r: r.success, share=True)}
+    figures: dict[str, Any] = {"success": over(lambda r: r.success, fraction=True)}
     for name, field in (*_FIGURES, ("time_s", "time_s")):
         figures[name] = over(lambda r, field=field: getattr(r, field))
     figures["episodes"] = len(records)
@@ -79,7 +79,7 @@ def draw_episode(record: Any, trace: Any) -> str:
         f'<svg class="map {record.end_reason}" viewBox="{low[0]:.2f} {-high[1]:.2f} {width:.2f} {height:.2f}" '
         f'role="img"><path class="wall" d="{outline_boxes(keep_low(solid))}"/>'
         f'<path class="block" d="{outline_boxes(Blocks(np.asarray(trace.blocks, np.float64)).boxes())}"/>'
-        f'<path class="way" d="{outline_way(np.asarray(way))}"/>{lost}'
+        f'<path class="way" d="{outline_path(np.asarray(way))}"/>{lost}'
         f'<circle class="start" cx="{sx:.2f}" cy="{-sy:.2f}" r="{LENGTH / 5:.2f}"/>'
         f'<circle class="goal" cx="{gx:.2f}" cy="{-gy:.2f}" r="{LENGTH / 2:.2f}"/></svg>'
     )

@@ -13,7 +13,7 @@ from PIL import Image
 
 from vinl.chain.choose import choose_locomotor
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.depth_cameras import open_eyes
+from vinl.chain.depth_cameras import open_depth_cameras
 from vinl.chain.episode import draw_routes, draw_setup
 from vinl.chain.navigators.base import Navigator
 from vinl.chain.navigators.choose import choose_navigator
@@ -111,7 +111,12 @@ class Walk:
         if not 0 <= time <= self.record.time_s:
             raise InputError(f"time must lie between 0 and {self.record.time_s:g} s, got {time:g}")
         pose = self.trace.poses[min(round(time / POSE_DT), len(self.trace.poses) - 1)]
-        return open_eyes(self.plan, [self.blocks], camera, self.config.ceiling).look(pose[None])[0].numpy().copy()
+        return (
+            open_depth_cameras(self.plan, [self.blocks], camera, self.config.ceiling)
+            .render(pose[None])[0]
+            .numpy()
+            .copy()
+        )
 
     def draw_views(self, time: float, cameras: Sequence[str | Camera] = ("locomotion", "navigation")) -> Image.Image:
         """The same as a picture, cameras side by side: bright is near, black is the far limit."""

@@ -17,7 +17,7 @@ class ChaseCamera:
         renderer: knows what stands in the way; without one the camera flies freely.
         distance: from the robot [m].
         elevation: angle above the horizon while nothing is in the way [rad].
-        smoothing: share of the way to the wanted pose that the camera covers at each call, 1 follows at once.
+        smoothing: fraction of the way to the wanted pose that the camera covers at each call, 1 follows at once.
     """
 
     def __init__(

@@ -39,8 +39,8 @@ def outline_boxes(boxes: Boxes) -> str:
     return "".join("M" + "L".join(f"{x:.2f} {-y:.2f}" for x, y in corners) + "Z" for corners in boxes.corners())
 
 
-def outline_way(path: Float[np.ndarray, "k 2"]) -> str:
-    """Path data of a way [m]: every second point, ``POINT_DT`` apart, and where it ended; to the centimetre."""
+def outline_path(path: Float[np.ndarray, "k 2"]) -> str:
+    """Path data of a path [m]: every second point, ``POINT_DT`` apart, and where it ended; to the centimetre."""
     return "M" + "L".join(f"{x:.2f} {-y:.2f}" for x, y in np.vstack([path[::2], path[-1]]))
 
 
@@ -70,7 +70,7 @@ def draw_floor(inside: Bool[np.ndarray, "rows columns"]) -> str:
 
 
 def draw_map(plan: FloorPlan, episodes: Sequence[Episode], first: int, radius: float) -> str:
-    """A floor plan with all ways through it.
+    """A floor plan with all paths through it.
 
     Args:
         plan: the floor plan.
@@ -101,7 +101,7 @@ def draw_map(plan: FloorPlan, episodes: Sequence[Episode], first: int, radius: f
         lost = "" if record.success else f'<path class="lost" d="{_cross(ex, ey)}"/>'
         parts.append(
             f'<g class="ep {record.end_reason}" id="e{first + k}" data-end="{record.time_s:.2f}"><path class="block" '
-            f'd="{outline_boxes(Blocks(trace.blocks).boxes())}"/><path class="way" d="{outline_way(trace.path)}"/>'
+            f'd="{outline_boxes(Blocks(trace.blocks).boxes())}"/><path class="way" d="{outline_path(trace.path)}"/>'
             f"{marks}{lost}<title>episode {record.episode}, seed {record.seed}: {record.end_reason}, "
             f"{record.distance_m:.1f} m in {record.time_s:.0f} s</title></g>"
         )

@@ -13,11 +13,11 @@ from jaxtyping import Float
 from vinl.chain.choose import check_cameras, choose_locomotor
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.contacts import KINDS
-from vinl.chain.controller import give_senses
-from vinl.chain.depth_cameras import Eyes, open_eyes
+from vinl.chain.controller import open_controller
+from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.chain.navigators.base import Navigator, Task, check_choice
 from vinl.chain.navigators.choose import load_navigator
-from vinl.chain.robot import Walker, joint_targets
+from vinl.chain.robot import Robot, joint_targets
 from vinl.chain.rollout import goal_in_heading_frame
 from vinl.chain.scene import FORCE_SENSORS, build_scene
 from vinl.config.errors import InputError
@@ -289,10 +289,10 @@ class LiveChain:
         """Physics, height scan and cameras of a world."""
         kp, kd = (float(self._locomotion.card.action[key]) for key in ("kp", "kd"))
         model = build_scene(world.plan.boxes, world.blocks.boxes(), kp=kp, kd=kd)
-        self._walker = Walker(model)
-        self._senses = give_senses(self._locomotion, world.plan, [world.blocks], self._config.ceiling)
-        self._cameras: dict[str, Eyes] = {
-            name: open_eyes(world.plan, [world.blocks], camera, self._config.ceiling)
+        self._walker = Robot(model)
+        self._senses = open_controller(self._locomotion, world.plan, [world.blocks], self._config.ceiling)
+        self._cameras: dict[str, DepthCameras] = {
+            name: open_depth_cameras(world.plan, [world.blocks], camera, self._config.ceiling)
             for name, camera in self._choose_cameras().items()
         }
         self._feet = [int(model.geom(name).id) for name in FOOT_GEOMS]

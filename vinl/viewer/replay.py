@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.chain.contacts import KINDS
-from vinl.chain.depth_cameras import Eyes, open_eyes
+from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.chain.records import Episode
 from vinl.config.errors import InputError
 from vinl.render.video import POSE_DT
@@ -127,8 +127,8 @@ class Replay:
         self._poses: np.ndarray = trace.poses
         start = np.array([*record.start, record.yaw])
         self._world = World(plan, Blocks(trace.blocks), start, self._poses[0, 7:])
-        self._cameras: dict[str, Eyes] = {
-            camera.name: open_eyes(plan, [self._world.blocks], camera)
+        self._cameras: dict[str, DepthCameras] = {
+            camera.name: open_depth_cameras(plan, [self._world.blocks], camera)
             for camera in (LOCOMOTION_CAMERA, NAVIGATION_CAMERA)
         }
         steps = np.linalg.norm(np.diff(self._poses[:, :2], axis=0), axis=1)

@@ -17,7 +17,7 @@ LEAST_WAY = 1.0
 """A plan without two spots this far apart [m] is refused: the robot would arrive where it starts."""
 
 _MOST = 0.9
-"""If less than this share of the floor hangs together, the note says so."""
+"""If less than this fraction of the floor hangs together, the note says so."""
 
 _TRIES = 200
 

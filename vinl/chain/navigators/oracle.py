@@ -10,31 +10,31 @@ from jaxtyping import Float
 
 from vinl.chain.config import OracleConfig
 from vinl.chain.navigators.base import Task
-from vinl.chain.navigators.path import Way, plan_way
+from vinl.chain.navigators.path import PlannedPath, plan_path
 from vinl.config.errors import InputError
 from vinl.robot.cameras import Camera
 from vinl.robot.rotation import wrap_angle
 
 _SLOWEST = 0.6
-"""Share of the speed and of the look-ahead that is left in the narrowest gaps: at 2 Hz and full speed the robot would
+"""Fraction of the speed and of the look-ahead that is left in the narrowest gaps: at 2 Hz and full speed the robot would
 walk through half of a doorway between two decisions."""
 
 
 class OracleNavigator:
-    """Pure pursuit on a short way that keeps clear of walls where it can. Clutter is not known to it."""
+    """Pure pursuit on a short path that keeps clear of walls where it can. Clutter is not known to it."""
 
     camera: Camera | None = None
 
     def __init__(self, config: OracleConfig | None = None) -> None:
         self.config = config or OracleConfig()
         self._tasks: Sequence[Task] = []
-        self._ways: list[Way] = []
+        self._paths: list[PlannedPath] = []
         self._along: list[int] = []
 
     def reset(self, episodes: Sequence[Task]) -> None:
-        """Plan a way for every episode."""
+        """Plan a path for every episode."""
         self._tasks = list(episodes)
-        self._ways = [plan_way(task.space, task.route.start, task.route.goal) for task in self._tasks]
+        self._paths = [plan_path(task.space, task.route.start, task.route.goal) for task in self._tasks]
         self._along = [0] * len(self._tasks)
 
     def act(self, observation: dict[str, Any]) -> Float[np.ndarray, "n 2"]:
@@ -53,26 +53,26 @@ class OracleNavigator:
         return np.stack([speed, turn], 1)
 
     def _aim(self, k: int, xy: np.ndarray) -> tuple[np.ndarray, float, float]:
-        """The point of the way to head for, the length of the way that is left [m], and the share of the speed."""
+        """The point of the path to head for, the length of the path that is left [m], and the fraction of the speed."""
         near = self._nearest(k, xy)
-        if np.linalg.norm(self._ways[k].points[near] - xy) > self.config.replan_m:
+        if np.linalg.norm(self._paths[k].points[near] - xy) > self.config.replan_m:
             task = self._tasks[k]
             try:
-                self._ways[k] = plan_way(task.space, xy, task.route.goal)
-            except InputError:  # thrown off the floor plan: keep to the old way
+                self._paths[k] = plan_path(task.space, xy, task.route.goal)
+            except InputError:  # thrown off the floor plan: keep to the old path
                 pass
             else:
                 self._along[k] = 0
                 near = self._nearest(k, xy)
         self._along[k] = near
-        way = self._ways[k]
-        ease = _SLOWEST + (1.0 - _SLOWEST) * float(way.ease[near])
-        steps = np.linalg.norm(np.diff(way.points[near:], axis=0), axis=1).cumsum()
+        path = self._paths[k]
+        ease = _SLOWEST + (1.0 - _SLOWEST) * float(path.ease[near])
+        steps = np.linalg.norm(np.diff(path.points[near:], axis=0), axis=1).cumsum()
         ahead = near + 1 + int(np.searchsorted(steps, self.config.look_ahead * ease))
-        return way.points[min(ahead, len(way.points) - 1)], float(steps[-1]) if len(steps) else 0.0, ease
+        return path.points[min(ahead, len(path.points) - 1)], float(steps[-1]) if len(steps) else 0.0, ease
 
     def _nearest(self, k: int, xy: np.ndarray) -> int:
-        """The nearest point of the way within the next 2 m: it never jumps back, nor through a wall."""
+        """The nearest point of the path within the next 2 m: it never jumps back, nor through a wall."""
         first = self._along[k]
-        window = self._ways[k].points[first : first + 20]
+        window = self._paths[k].points[first : first + 20]
         return first + int(np.linalg.norm(window - xy, axis=1).argmin())

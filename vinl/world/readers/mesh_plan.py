@@ -22,7 +22,7 @@ FLOOR_AREA = 2.0
 """Least floor at one height [m2]."""
 
 FLOOR_SHARE = 0.25
-"""The floor is the lowest height with at least this share of what the height with the most level surface has."""
+"""The floor is the lowest height with at least this fraction of what the height with the most level surface has."""
 
 BIN = 0.05
 """Heights are counted in bins of this size [m]."""

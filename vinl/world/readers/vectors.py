@@ -24,7 +24,7 @@ BESIDE = 0.2
 """So far from a door's line both sides are looked at: a door with the outside on one of them is a window [m]."""
 
 CLOSED = 0.6
-"""If the walls enclose less than this share of what they enclose once gaps as wide as doors are closed, they have
+"""If the walls enclose less than this fraction of what they enclose once gaps as wide as doors are closed, they have
 such gaps."""
 
 TOPS = {"cooking_counter": 0.9, "washing_basin": 0.85, "bathtub": 0.55, "toilet": 0.8, "stairs": 1.0}

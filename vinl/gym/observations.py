@@ -9,8 +9,8 @@ import numpy as np
 from gymnasium import spaces
 from jaxtyping import Float
 
-from vinl.chain.depth_cameras import Eyes, open_eyes
-from vinl.chain.ground_map import GroundScan
+from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
+from vinl.chain.ground_map import GroundMap
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.gym.trip import Trip
@@ -54,7 +54,7 @@ def choose_cameras(chosen: Cameras | None, joints: bool, navigation: Camera | No
     return cameras
 
 
-class AgentSenses:
+class AgentObservation:
     """What the agent observes.
 
     Args:
@@ -82,14 +82,16 @@ class AgentSenses:
         for image, camera in cameras.items():
             parts[image] = spaces.Box(0.0, 1.0, (camera.height, camera.width), np.float32)
         self.space = spaces.Dict(parts)
-        self._eyes: dict[str, Eyes] = {}
-        self._scan: GroundScan | None = None
+        self._depth: dict[str, DepthCameras] = {}
+        self._scan: GroundMap | None = None
 
     def enter(self, trip: Trip, ceiling: float | None) -> None:
         """A new episode begins, in a home with or without a ceiling [m]."""
         plan, blocks = trip.task.space.plan, [trip.setup.blocks]
-        self._eyes = {image: open_eyes(plan, blocks, camera, ceiling) for image, camera in self._cameras.items()}
-        self._scan = GroundScan(plan, blocks) if self._with_scan else None
+        self._depth = {
+            image: open_depth_cameras(plan, blocks, camera, ceiling) for image, camera in self._cameras.items()
+        }
+        self._scan = GroundMap(plan, blocks) if self._with_scan else None
 
     def observe(
         self, trip: Trip, command: Float[np.ndarray, "1 3"], previous: Float[np.ndarray, "1 a"]
@@ -115,6 +117,6 @@ class AgentSenses:
             parts["goal"] = goal
         else:
             parts["vector"] = np.concatenate([goal, previous[0].astype(np.float32)])
-        for image, eyes in self._eyes.items():
-            parts[image] = eyes.camera.normalise(eyes.look(qpos)[0]).numpy().copy()
+        for image, cameras in self._depth.items():
+            parts[image] = cameras.camera.normalise(cameras.render(qpos)[0]).numpy().copy()
         return parts
