@@ -142,7 +142,7 @@ def main() -> None:
     assert isinstance(loco, DepthPolicy) and isinstance(nav, DepthPolicy), "give policies that see"
     locomotor = Watching(loco, load_policy("teacher"))
     navigator = Guided(nav, locomotor)
-    DepthCameras.render = timed(lambda cameras, *_: f"{cameras.camera.name} camera", DepthCameras.render)
+    DepthCameras.look = timed(lambda cameras, *_: f"{cameras.camera.name} camera", DepthCameras.look)
     Robot.step = timed("physics and contacts", Robot.step)
     Recorder.count = timed("records", Recorder.count)
     config, records = EvaluationConfig(), []

@@ -43,7 +43,7 @@ class LocomotionController:
         actions: Float[np.ndarray, "n 12"],
         rows: Sequence[int] | None = None,
     ) -> Float[np.ndarray, "n 12"]:
-        """The next actions. ``actions`` are the last ones, ``rows`` those still alive (``DepthCameras.render``)."""
+        """The next actions. ``actions`` are the last ones, ``rows`` those still alive (``DepthCameras.look``)."""
         ground = np.zeros((len(qpos), SCAN_SIZE))
         if self._scan is not None:
             ground, command = self._scan.read(qpos), self._scan.bend(qpos, command)
@@ -51,7 +51,7 @@ class LocomotionController:
         if self._cameras is None:
             answer = self._locomotor.act(observation)
         else:
-            answer = self._locomotor.act(observation, self._cameras.render(qpos, rows))
+            answer = self._locomotor.act(observation, self._cameras.look(qpos, rows))
         return check_actions(answer, len(qpos), self._locomotor)
 
 
@@ -62,8 +62,10 @@ def open_controller(
     ceiling: float | None = None,
     errors: CameraErrors | None = None,
 ) -> LocomotionController:
-    """The controller of robots in a floor plan, each with its own clutter, see ``open_depth_cameras``; ``errors`` are those of their
-    cameras."""
+    """The controller of robots in a floor plan, each with its own clutter, see ``open_depth_cameras``.
+
+    ``errors`` are those of their cameras.
+    """
     scan = GroundMap(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
     cameras = None if locomotor.camera is None else open_depth_cameras(plan, blocks, locomotor.camera, ceiling)
     return LocomotionController(

@@ -42,7 +42,7 @@ class DepthCameras:
         self._renders: dict[int, PreparedRender] = {}
         self._images = torch.full((len(worlds), camera.height, camera.width), camera.far)
 
-    def render(
+    def look(
         self, qpos: Float[np.ndarray, "n 19"], rows: Sequence[int] | None = None
     ) -> Float[torch.Tensor, "n height width"]:
         """Depth [m] along the optical axis, the far limit where nothing is hit.
@@ -84,7 +84,7 @@ class DepthCameras:
 def open_depth_cameras(
     plan: FloorPlan, blocks: Sequence[Blocks], camera: Camera, ceiling: float | None = None
 ) -> DepthCameras:
-    """DepthCameras of the robots of a unit in their homes: walls, furniture, floor and the clutter of each episode.
+    """The cameras of robots in their homes: walls, furniture, floor and the clutter of each episode.
 
     Args:
         plan: the floor plan.

@@ -100,7 +100,7 @@ def run_episodes(
             seen = {"goal": goal_in_heading_frame(believed, goals), "previous_action": choice, "pose": believed}
             seen["true_pose"] = pose
             if cameras is not None:
-                seen["depth"] = cameras.render(qpos, alive)
+                seen["depth"] = cameras.look(qpos, alive)
             choice = check_choice(navigator.act(seen), n, navigator)
             command[:, 0], command[:, 2] = choice[:, 0], choice[:, 1]
         for k in alive:

@@ -61,6 +61,6 @@ class Guide:
         """Forward speed [m/s] and yaw rate [rad/s] of the next half second."""
         seen = {"goal": trip.goal, "previous_action": self._last, "pose": trip.pose}
         if self._cameras is not None:
-            seen["depth"] = self._cameras.render(trip.qpos, [0])
+            seen["depth"] = self._cameras.look(trip.qpos, [0])
         self._last = check_choice(self._navigator.act(seen), 1, self._navigator)
         return self._last[0]

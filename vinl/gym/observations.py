@@ -118,5 +118,5 @@ class AgentObservation:
         else:
             parts["vector"] = np.concatenate([goal, previous[0].astype(np.float32)])
         for image, cameras in self._depth.items():
-            parts[image] = cameras.camera.normalise(cameras.render(qpos)[0]).numpy().copy()
+            parts[image] = cameras.camera.normalise(cameras.look(qpos)[0]).numpy().copy()
         return parts
