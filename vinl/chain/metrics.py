@@ -66,8 +66,8 @@ def summarise(
     values: Sequence[float], seeds: Sequence[int], fraction: bool = False
 ) -> dict[str, float | list[float] | None]:
     """Mean over episodes, standard deviation of the seeds' means (divided by their number, as in the paper; None of one
-    seed), and the 95 % interval of the mean: Wilson's for a fraction, by bootstrap over episodes otherwise. None if there
-    is no value.
+    seed), and the 95 % interval of the mean: Wilson's for a fraction, by bootstrap over episodes otherwise. None if
+    there is no value.
     """
     if not len(values):
         return {"mean": None, "std_over_seeds": None, "ci95": None}

@@ -16,8 +16,8 @@ from vinl.robot.cameras import Camera
 from vinl.robot.rotation import wrap_angle
 
 _SLOWEST = 0.6
-"""Fraction of the speed and of the look-ahead that is left in the narrowest gaps: at 2 Hz and full speed the robot would
-walk through half of a doorway between two decisions."""
+"""Fraction of the speed and of the look-ahead that is left in the narrowest gaps: at 2 Hz and full speed the robot
+would walk through half of a doorway between two decisions."""
 
 
 class OracleNavigator:
