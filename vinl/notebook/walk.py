@@ -112,10 +112,7 @@ class Walk:
             raise InputError(f"time must lie between 0 and {self.record.time_s:g} s, got {time:g}")
         pose = self.trace.poses[min(round(time / POSE_DT), len(self.trace.poses) - 1)]
         return (
-            open_depth_cameras(self.plan, [self.blocks], camera, self.config.ceiling)
-            .render(pose[None])[0]
-            .numpy()
-            .copy()
+            open_depth_cameras(self.plan, [self.blocks], camera, self.config.ceiling).look(pose[None])[0].numpy().copy()
         )
 
     def draw_views(self, time: float, cameras: Sequence[str | Camera] = ("locomotion", "navigation")) -> Image.Image:
