@@ -107,6 +107,11 @@ def test_commands_on_the_page_have_the_options_that_it_gives(page: Path, monkeyp
                 pytest.fail(f"{line}: {error}")
 
 
+def test_index_has_every_command() -> None:
+    index = (ROOT / "docs" / "index.md").read_text()
+    assert not [name for name in app.COMMANDS if f"| `vinl {name}` |" not in index]
+
+
 def test_one_description_everywhere() -> None:
     said = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["description"]
     assert said and f"{said}." in app._help()
