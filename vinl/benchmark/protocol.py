@@ -46,7 +46,7 @@ class Protocol:
     def describe(self, row: Row) -> dict[str, Any]:
         """What the episodes of a row depend on, as plain data."""
         return {
-            "evaluation": dump_config(self.config),
+            "evaluation": dump_config(row.apply(self.config)),
             "obstacles": {"preset": row.obstacles, **asdict(CLUTTER[row.obstacles])},
             "episodes_per_plan": self.episodes,
             "seeds": list(self.seeds),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TypeVar
@@ -12,6 +12,7 @@ from vinl.benchmark.shard import Shard
 from vinl.chain.batching import is_steady, is_steady_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_setup
+from vinl.chain.fault_config import FaultConfig
 from vinl.chain.navigators.base import Navigator
 from vinl.chain.records import Episode, Key
 from vinl.chain.rollout import run_episodes
@@ -33,11 +34,16 @@ _PIECES = 3
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One line of a table: who walks, through what clutter."""
+    """One line of a table: who walks, through what clutter, with what faults (None: those of the protocol)."""
 
     locomotor: Policy
     navigator: Navigator
     obstacles: str = "none"
+    faults: FaultConfig | None = None
+
+    def apply(self, config: EvaluationConfig) -> EvaluationConfig:
+        """The rules with the row's own faults."""
+        return config if self.faults is None else replace(config, faults=self.faults)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +135,8 @@ def run_job(context: Context, job: Job) -> dict[Key, Episode]:
     """
     shared: Shared = context.shared
     row, plan, routes = shared.rows[job.row], shared.plans[job.plan], shared.routes[job.plan]
-    clutter = CLUTTER[row.obstacles]
-    setups = [draw_setup(plan, routes[k], k, seed, clutter, shared.config) for seed, k in job.cells]
+    clutter, config = CLUTTER[row.obstacles], row.apply(shared.config)
+    setups = [draw_setup(plan, routes[k], k, seed, clutter, config) for seed, k in job.cells]
     rows = [number for number, cell in enumerate(job.cells) if cell in job.filmed]
     tell: Callable[[Episode], None] = lambda episode: context.report(job.row, episode)  # noqa: E731
     done = run_episodes(
@@ -138,7 +144,7 @@ def run_job(context: Context, job: Job) -> dict[Key, Episode]:
         setups,
         row.locomotor,
         row.navigator,
-        shared.config,
+        config,
         range(len(setups)) if shared.record else rows,
         (lambda _: None) if job.at_once else tell,
         context.is_stopped,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from vinl.chain.fault_config import FaultConfig
 from vinl.config.errors import InputError
 from vinl.sensing.odometry_config import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig
@@ -57,6 +58,7 @@ class EvaluationConfig:
         sensors: errors of the depth cameras of navigator and locomotor, see ``vinl.sensing.sensor_config``.
         odometry: errors of where a learned navigator believes to be; it arrives where the goal is.
         oracle: how the shortest-path follower walks.
+        faults: what is wrong with motors, body and sensors; nothing by default.
     """
 
     time_limit: float = 125.0
@@ -73,6 +75,7 @@ class EvaluationConfig:
     sensors: SensorConfig = field(default_factory=SensorConfig)
     odometry: OdometryConfig = field(default_factory=OdometryConfig)
     oracle: OracleConfig = field(default_factory=OracleConfig)
+    faults: FaultConfig = field(default_factory=FaultConfig)
 
     def __post_init__(self) -> None:
         if not 0.02 <= self.time_limit <= 3600:

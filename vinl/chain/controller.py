@@ -61,13 +61,14 @@ def open_controller(
     blocks: Sequence[Blocks],
     ceiling: float | None = None,
     errors: CameraErrors | None = None,
+    pitch: float = 0.0,
 ) -> LocomotionController:
     """The controller of robots in a floor plan, each with its own clutter, see ``open_depth_cameras``.
 
-    ``errors`` are those of their cameras.
+    ``errors`` are those of their cameras, which look down by ``pitch`` [rad] more than they should.
     """
     scan = GroundMap(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
-    cameras = None if locomotor.camera is None else open_depth_cameras(plan, blocks, locomotor.camera, ceiling)
+    cameras = None if locomotor.camera is None else open_depth_cameras(plan, blocks, locomotor.camera, ceiling, pitch)
     return LocomotionController(
         locomotor, scan, cameras if cameras is None or errors is None else errors.put_on(cameras)
     )

@@ -15,7 +15,7 @@ from vinl.world.clutter import ClutterPreset, scatter_blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.start_goal import StartGoal, sample_start_goals
 
-_START_GOALS, _CLUTTER, _START, _SENSORS = range(4)
+_START_GOALS, _CLUTTER, _START, _SENSORS, _FAULTS = range(5)
 
 
 def make_rng(purpose: int, plan: str, *numbers: int) -> np.random.Generator:
@@ -66,6 +66,11 @@ def draw_setup(
 def sensor_key(setup: EpisodeSetup) -> int:
     """The number below 2^31 that the errors of an episode's cameras and odometry follow from."""
     return int(make_rng(_SENSORS, setup.plan, setup.seed, setup.episode).integers(2**31))
+
+
+def draw_faults(setup: EpisodeSetup) -> np.random.Generator:
+    """Where the errors of an episode's measured velocity and attitude come from."""
+    return make_rng(_FAULTS, setup.plan, setup.seed, setup.episode)
 
 
 def draw_setups(

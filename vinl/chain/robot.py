@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.chain.contacts import ContactReader
+from vinl.chain.delay_line import DelayLine
 from vinl.policies.card import PolicyCard
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, STANDING_HEIGHT, SUBSTEPS, home_qpos
 
@@ -17,9 +18,15 @@ ACTION_LIMIT = 100.0
 
 
 class Robot:
-    """A robot and what it touches. ``qpos`` and ``qvel`` are views of its state."""
+    """A robot and what it touches. ``qpos`` and ``qvel`` are views of its state.
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    Args:
+        model: the world.
+        late: joint targets reach the motors so many physics steps late.
+    """
+
+    def __init__(self, model: mujoco.MjModel, late: int = 0) -> None:
+        self._late, self._line = late, None
         self.model, self.data = model, mujoco.MjData(model)
         self.contacts = ContactReader(model, self.data)
         self.qpos: np.ndarray = self.data.qpos
@@ -34,12 +41,13 @@ class Robot:
         self.qpos[7:] = joints
         mujoco.mj_forward(self.model, self.data)
         self._time = 0.0
+        self._line = DelayLine(self._late, joints, SUBSTEPS) if self._late else None
 
     def step(self, target: Float[np.ndarray, "12"]) -> None:
         """Drive to joint targets [rad] for one control step, and latch the contacts of its physics steps."""
-        self._ctrl[:] = target
         self.contacts.clear()
-        for _ in range(SUBSTEPS):
+        for sent in [target] * SUBSTEPS if self._line is None else self._line.push(target):
+            self._ctrl[:] = sent
             mujoco.mj_step(self.model, self.data)
             self.contacts.look()
         self._time += CONTROL_DT

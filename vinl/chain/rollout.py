@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
@@ -12,7 +13,9 @@ from vinl.chain.config import EvaluationConfig
 from vinl.chain.controller import open_controller
 from vinl.chain.dead_reckoning import DeadReckoning
 from vinl.chain.depth_cameras import open_depth_cameras
-from vinl.chain.episode import EpisodeSetup, sensor_key
+from vinl.chain.episode import EpisodeSetup, draw_faults, sensor_key
+from vinl.chain.fault_config import FaultConfig
+from vinl.chain.faults import FaultyState, change_body
 from vinl.chain.navigators.base import Navigator, Task, check_choice
 from vinl.chain.real_cameras import CameraErrors
 from vinl.chain.recorder import Recorder
@@ -22,7 +25,6 @@ from vinl.chain.scene import build_scene
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.rotation import yaw_of
-from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.free_space import FreeSpace
 
@@ -73,12 +75,16 @@ def run_episodes(
     locomotor, navigator = batch_policy(locomotor), batch_navigator(navigator)
     locomotor.reset(n)
     navigator.reset([Task(space, setup.route) for setup in setups])
-    robots = _spawn_robots(plan, setups, locomotor)
+    robots, faults = _spawn_robots(plan, setups, locomotor, config.faults), config.faults
     blocks = [setup.blocks for setup in setups]
     keys = [sensor_key(setup) for setup in setups]
-    sensors = None if config.sensors.is_ideal else CameraErrors(config.sensors, keys)
-    controller = open_controller(locomotor, plan, blocks, config.ceiling, sensors)
-    cameras = None if navigator.camera is None else open_depth_cameras(plan, blocks, navigator.camera, config.ceiling)
+    of_cameras, pitch = faults.add_to(config.sensors), math.radians(faults.camera_pitch)
+    sensors = None if of_cameras.is_ideal else CameraErrors(of_cameras, keys)
+    state = FaultyState(faults, [draw_faults(setup) for setup in setups]) if faults.spoils_state else None
+    controller = open_controller(locomotor, plan, blocks, config.ceiling, sensors, pitch)
+    cameras = None
+    if navigator.camera is not None:
+        cameras = open_depth_cameras(plan, blocks, navigator.camera, config.ceiling, pitch)
     if cameras is not None and sensors is not None:
         cameras = sensors.put_on(cameras)
     reckoning = None if config.odometry.is_exact else DeadReckoning(config.odometry, keys)
@@ -92,6 +98,7 @@ def run_episodes(
     for step in range(limit):
         if sensors is not None:
             sensors.note(qpos)
+        known = (qpos, qvel) if state is None else state.measure(qpos, qvel, alive)
         if step % config.navigation_period == 0:
             if is_stopped():
                 raise InterruptedRunError
@@ -105,7 +112,7 @@ def run_episodes(
             command[:, 0], command[:, 2] = choice[:, 0], choice[:, 1]
         for k in alive:
             recorders[k].note_pose(step, qpos[k], command[k])
-        actions = controller.act(qpos, qvel, command, actions, alive)
+        actions = controller.act(*known, command, actions, alive)
         targets = joint_targets(actions, locomotor.card)
         for k in alive:
             robots[k].step(targets[k])
@@ -130,15 +137,20 @@ def run_episodes(
     return [done[k] for k in range(n)]
 
 
-def _spawn_robots(plan: FloorPlan, setups: Sequence[EpisodeSetup], locomotor: Policy) -> list[Robot]:
+def _spawn_robots(
+    plan: FloorPlan, setups: Sequence[EpisodeSetup], locomotor: Policy, faults: FaultConfig
+) -> list[Robot]:
     kp, kd = (float(locomotor.card.action[key]) for key in ("kp", "kd"))
+    kp, kd = kp * faults.kp_scale, kd * faults.kd_scale
     robots, bare = [], None
     for setup in setups:
-        if len(setup.blocks):
+        model = bare
+        if model is None or len(setup.blocks):
             model = build_scene(plan.boxes, setup.blocks.boxes(), kp=kp, kd=kd)
-        else:
-            model = bare = bare or build_scene(plan.boxes, Blocks.empty().boxes(), kp=kp, kd=kd)
-        robot = Robot(model)
+            change_body(model, faults)
+        if not len(setup.blocks):
+            bare = model
+        robot = Robot(model, faults.delay_steps)
         robot.spawn(float(setup.route.start[0]), float(setup.route.start[1]), setup.yaw, setup.joints)
         robots.append(robot)
     return robots

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -55,8 +55,13 @@ class Options:
     """Walk all rows of a table instead of one robot, each the same episodes, beside the paper's figures."""
     table_file: str = "eval/table"
     """Rows of the table: a shipped config or a YAML file."""
+    faults: bool = False
+    """Walk the same episodes again with each of a matrix of faults (late motors, noisy sensors ...), one at a time,
+    beside the ideal robot. For a single setting without --faults: --set faults.action_delay=0.02."""
+    faults_file: str = "eval/faults"
+    """The faults: a shipped config or a YAML file."""
     rows: tuple[str, ...] = ()
-    """Only these rows of the table."""
+    """Only these rows of the table or of the faults."""
     strict: bool = False
     """A row whose policy is not there is an error; otherwise it is left out, which the table says."""
     video: bool = False
@@ -107,7 +112,9 @@ def main(argv: list[str]) -> int:
     workers = os.cpu_count() or 1 if options.workers is None else options.workers
     films: Films = "all" if options.video_all else "first" if options.video else "none"
     check_numbers(options.episodes, options.seeds, options.first_seed, options.obstacles or "none", workers)
-    check_folder(out, options.table)
+    if options.faults and (options.table or options.shard != "1/1"):
+        raise InputError("--faults goes neither with --table nor with --shard; evaluate them one after the other")
+    check_folder(out, options.table or options.faults)
     shard = Shard.parse(options.shard)
     config = _load_rules(options)
 
@@ -123,7 +130,7 @@ def main(argv: list[str]) -> int:
         return Protocol(named, episodes, seeds, config, shard, films, routes, options.record)
 
     command = ["vinl", "eval", *strip_command(argv)]
-    run = _run_table if options.table else _run_one
+    run = _run_table if options.table else _run_faults if options.faults else _run_one
     run(options, out, prepare, workers, command)
     return 0
 
@@ -134,22 +141,43 @@ def _run_one(options: Options, out: Path, prepare: Callable[[], Protocol], worke
     from vinl.benchmark.evaluate import evaluate_rows
     from vinl.benchmark.outputs import write_run
     from vinl.benchmark.summary import print_summary
-    from vinl.chain.choose import best_locomotor
 
     if options.rows or options.strict:
-        raise InputError("--rows and --strict belong to a table; give --table too")
-    row = _load_row(
-        options.loco or best_locomotor(),
-        options.nav or "oracle",
-        options.obstacles or "none",
-        options.recovery,
-        options,
-    )
+        raise InputError("--rows and --strict belong to a table; give --table (or --faults, which has rows) too")
+    row = _load_single(options)
     protocol, console = prepare(), Console()
     with _progress(console, out) as progress:
         results = evaluate_rows([row], protocol, workers, [out], True, options.fresh, command, progress.show)[0]
     write_run(out, results, command, workers, protocol.shard)
     print_summary(console, results, out)
+
+
+def _run_faults(options: Options, out: Path, prepare: Callable[[], Protocol], workers: int, command: list[str]) -> None:
+    from rich.console import Console
+
+    from vinl.benchmark.evaluate import evaluate_rows
+    from vinl.benchmark.fault_table import FaultMatrix, print_faults, summarise_faults
+    from vinl.benchmark.outputs import RESULTS_FILE, write_run
+    from vinl.config.loader import load_config
+    from vinl.config.output import write_json
+
+    if options.strict:
+        raise InputError("--strict belongs to a table; give --table too")
+    faults = load_config(FaultMatrix, options.faults_file).choose(options.rows)
+    row = _load_single(options)
+    protocol, console = prepare(), Console()
+    if not protocol.config.faults.is_neutral:
+        raise InputError("--faults tries one fault at a time; leave the group faults of the config as it is")
+    rows = [replace(row, faults=fault) for fault in faults.values()]
+    folders = [out / name for name in faults]
+    with _progress(console, out) as progress:
+        results = evaluate_rows(rows, protocol, workers, folders, True, options.fresh, command, progress.show)
+    for folder, one in zip(folders, results, strict=True):
+        write_run(folder, one, command, workers)
+    data = summarise_faults(faults, results, command, protocol.config.min_metres)
+    write_json(out / RESULTS_FILE, data)
+    print_faults(console, data)
+    console.print(f"figures {out / RESULTS_FILE}, each fault's in the folder of its name", soft_wrap=True)
 
 
 def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], workers: int, command: list[str]) -> None:
@@ -186,6 +214,14 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], wor
         for (name, row), results in zip(present.items(), done, strict=True)
     ]
     print_table(console, write_table(out, rows, reference, left_out, command, workers, protocol.shard), out)
+
+
+def _load_single(options: Options) -> Row:
+    """Who walks without a table."""
+    from vinl.chain.choose import best_locomotor
+
+    loco, nav, obstacles = options.loco or best_locomotor(), options.nav or "oracle", options.obstacles or "none"
+    return _load_row(loco, nav, obstacles, options.recovery, options)
 
 
 def _load_row(loco: str, nav: str, obstacles: str, recovery: bool, options: Options) -> Row:

@@ -32,7 +32,6 @@ _FRACTIONS = (
 _MEANS = (
     ("foot_steps_per_crossing", "feet"),
     ("leg_steps_per_crossing", "legs"),
-    ("trunk_steps_per_crossing", "trunk"),
 )
 """Columns in control steps on the bar per crossing."""
 
