@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
+import tyro
 from rich.console import Console
 from rich.table import Table
 
-from vinl.cli.options import parse_options
+from vinl.cli.options import parse_options, settings_first
 from vinl.cli.policies import flatten
 from vinl.config.errors import InputError
 
@@ -71,11 +72,24 @@ class NavOptions:
     """Print JSON instead of a table."""
 
 
+@dataclass(frozen=True)
+class MemoryOptions:
+    """GPU memory that a training of the navigation policy takes, predicted without a GPU [GB]: an upper estimate, as a
+    compiled network keeps less for its backward pass."""
+
+    overrides: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    """Settings of the config as key=value, such as num_envs=512 ppo.minibatches=16 homes.count=2000."""
+    config: str = "nav/default"
+    """Name of a shipped config or a YAML file."""
+    json: bool = False
+    """Print JSON instead of a table."""
+
+
 def main(argv: list[str]) -> int:
-    """Measure one of the three and print its figures."""
+    """Measure one of them and print its figures."""
     what = argv[0] if argv else "--help"
     if what in ("-h", "--help"):
-        print("usage: vinl bench loco|nav|depth [OPTIONS]\n\nvinl bench loco --help and so on list them.")
+        print("usage: vinl bench loco|nav|depth|memory [OPTIONS]\n\nvinl bench loco --help and so on list them.")
         return 0
     if what == "loco":
         options = parse_options(LocoOptions, argv[1:], "bench loco")
@@ -86,8 +100,11 @@ def main(argv: list[str]) -> int:
     elif what == "nav":
         options = parse_options(NavOptions, argv[1:], "bench nav")
         figures = _bench_nav(options)
+    elif what == "memory":
+        options = parse_options(MemoryOptions, settings_first(MemoryOptions, argv[1:]), "bench memory")
+        figures = _predict_memory(options)
     else:
-        raise InputError(f"there is no benchmark {what!r}; choose loco, nav or depth")
+        raise InputError(f"there is no benchmark {what!r}; choose loco, nav, depth or memory")
     _print(figures, what, options.json)
     return 0
 
@@ -118,6 +135,15 @@ def _bench_nav(options: NavOptions) -> dict[str, Any]:
 
     config = load_config(NavConfig, options.config)
     return run_nav(options.num_envs, options.homes, options.seconds, device, config, options.tree)
+
+
+def _predict_memory(options: MemoryOptions) -> dict[str, Any]:
+    from vinl.config.loader import load_config
+    from vinl.nav.config import NavConfig
+    from vinl.nav.memory_budget import predict_memory
+
+    figures = predict_memory(load_config(NavConfig, options.config, options.overrides))
+    return {f"{name}_gb": round(value, 2) for name, value in figures.items()}
 
 
 def _bench_depth(options: DepthOptions) -> dict[str, Any]:

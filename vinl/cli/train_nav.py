@@ -48,6 +48,8 @@ class Options:
     """Updates in all (default: the config's)."""
     minutes: float | None = None
     """The training is over after so many minutes too, and what moves during it keeps to them (default: no limit)."""
+    memory: float | None = None
+    """Use at most so much memory of each GPU [GB], as on a smaller card (default: all of it). Homes are not counted."""
     seed: int | None = None
     """Of everything random but the homes (default: the config's)."""
     save_every: float = 60.0
@@ -67,6 +69,8 @@ def main(argv: list[str]) -> int:
         raise InputError(f"--iterations must be at least 1, got {options.iterations}")
     if options.minutes is not None and options.minutes <= 0:
         raise InputError(f"--minutes must be positive, got {options.minutes}")
+    if options.memory is not None and options.memory <= 0:
+        raise InputError(f"--memory must be positive, got {options.memory}")
     if options.resume and options.from_policy:
         raise InputError("--from starts a new run and --resume goes on with an old one; give one of them")
     fresh = options.overrides or options.config != "default" or options.out or options.num_envs or options.seed
@@ -99,6 +103,7 @@ def main(argv: list[str]) -> int:
         minutes=options.minutes,
         from_policy=options.from_policy,
         profile=options.profile,
+        memory=options.memory,
     )
     if int(os.environ.get("RANK", "0")) == 0:
         print(

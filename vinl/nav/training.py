@@ -53,6 +53,7 @@ def train_navigator(
     minutes: float | None = None,
     from_policy: str | None = None,
     profile: bool = False,
+    memory: float | None = None,
 ) -> bool:
     """Train a navigator, or go on with a run. Under torchrun, this is one of the processes.
 
@@ -66,13 +67,14 @@ def train_navigator(
         minutes: after which the training is over too; settings that move over the training keep to them.
         from_policy: start from the weights of this policy or run, of a run from its critic and spread of the actions
             too; default: fresh ones.
+        memory: torch takes at most so much of the GPU's memory [GB]; default: all of it.
         profile: write where the time of one iteration goes to ``profile.txt`` in the folder.
 
     Returns:
         Whether the run is complete (an interrupt stops it earlier; both leave a checkpoint and a policy).
 
     Raises:
-        InputError: the folder or a setting cannot be used.
+        InputError: the folder or a setting cannot be used, or the GPU's memory is too small for it.
     """
     run = RunFolder(folder)
     resume = config is None
@@ -93,6 +95,9 @@ def train_navigator(
     if device.startswith("cuda"):
         torch.set_num_threads(min(torch.get_num_threads(), _HOST_THREADS))
         torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = torch.backends.cudnn.benchmark = True
+        if memory is not None:
+            total = torch.cuda.get_device_properties(device).total_memory
+            torch.cuda.set_per_process_memory_fraction(min(memory * 1e9 / total, 1.0), device)
     torch.manual_seed(config.seed + peers.rank)
     own = separate(config, peers.rank, peers.count)
     environment = build_environment(own, device, peers)
@@ -142,6 +147,11 @@ def train_navigator(
         loop.resume()
     try:
         return loop.train(iterations or config.iterations, minutes)
+    except torch.OutOfMemoryError:
+        raise InputError(
+            f"the GPU's memory is too small for num_envs={config.num_envs}, ppo.minibatches={config.ppo.minibatches}; "
+            "lower the first or raise the second (vinl bench memory predicts what they take)"
+        ) from None
     finally:
         environment.homes.close()
         peers.close()
