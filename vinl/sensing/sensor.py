@@ -11,7 +11,7 @@ from torch import Tensor
 
 from vinl.robot.cameras import Camera
 from vinl.sensing.sensor_config import SensorConfig
-from vinl.sensing.sensor_kernels import Cameras, SensorRules, draw_cameras, spoil_depth
+from vinl.sensing.sensor_kernels import PATCHES, Cameras, SensorRules, draw_cameras, draw_patches, spoil_depth
 
 _DRAWN = {
     "amplitude": (torch.float32, (), None),
@@ -80,7 +80,12 @@ class DepthSensor:
         """
         if not self.config.spoils or not len(images):
             return images
-        spoilt = torch.empty_like(images)
+        spoilt, shape = torch.empty_like(images), (len(images), int(PATCHES))
+        patches = wp.from_torch(torch.empty(*shape, 3, device=self._device), dtype=wp.vec3)
+        if self.config.patches > 0:
+            aspect = self._camera.height / self._camera.width
+            drawn = [self._rules, self.cameras, wp.from_torch(rows), wp.from_torch(key), aspect, patches]
+            self._launch(draw_patches, shape, drawn)
         inputs = [
             self._rules,
             self.cameras,
@@ -92,6 +97,7 @@ class DepthSensor:
             self._camera.far,
             unit,
             self._lost / unit,
+            patches,
             wp.from_torch(images.contiguous()),
             wp.from_torch(spoilt),
         ]

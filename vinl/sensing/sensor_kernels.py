@@ -1,7 +1,7 @@
 """The Warp kernels of a depth camera's errors, one thread a camera or a pixel; the navigation environment and the
 evaluation in MuJoCo C run the same ones. A file of their own: Warp compiles these functions, Python never runs them."""
 
-# ruff: noqa: UP018 - a variable of a kernel that changes must be made by its type
+
 # pyright: reportInvalidTypeForm=false, reportCallIssue=false, reportArgumentType=false
 # pyright: reportOperatorIssue=false, reportIndexIssue=false, reportAttributeAccessIssue=false
 
@@ -72,27 +72,29 @@ def draw_cameras(rules: SensorRules, key: wp.array(dtype=wp.int32), chosen: wp.a
     cameras.surfaces[n] = wp.randi(state, 0, 2147483647)
 
 
-@wp.func
+@wp.kernel
 @no_type_check
-def in_patch(
-    rules: SensorRules, key: wp.int32, u: wp.float32, v: wp.float32, aspect: wp.float32, amplitude: wp.float32
+def draw_patches(
+    rules: SensorRules,
+    cameras: Cameras,
+    rows: wp.array(dtype=wp.int32),
+    key: wp.array(dtype=wp.int32),
+    aspect: wp.float32,
+    patches: wp.array(dtype=wp.vec3, ndim=2),
 ):
-    """Whether a point of the image (u to the right from 0 to 1, v down in the same unit) lies in one of its patches."""
+    """Where the patches without a return of an image are, in widths from its upper left corner, and the squares of
+    their radii; negative: there is none."""
+    image, k = wp.tid()
     a = rules.patch_size[0]
     b = rules.patch_size[1]
     area = 0.7853982 * (a * a + a * b + b * b) / 3.0  # of a circle, on average, in squares of the width
-    chance = rules.patches * amplitude * aspect / (area * float(PATCHES))
-    state = wp.rand_init(key, -1)
-    inside = bool(False)
-    for _ in range(PATCHES):
-        there = wp.randf(state)
-        x = wp.randf(state)
-        y = wp.randf(state) * aspect
-        radius = 0.5 * (a + (b - a) * wp.randf(state))
-        away = wp.vec2(u - x, v - y)
-        if there < chance and wp.dot(away, away) < radius * radius:
-            inside = True
-    return inside
+    chance = rules.patches * cameras.amplitude[rows[image]] * aspect / (area * float(PATCHES))
+    state = wp.rand_init(key[image], -1 - k)
+    there = wp.randf(state)
+    x = wp.randf(state)
+    y = wp.randf(state) * aspect
+    radius = 0.5 * (a + (b - a) * wp.randf(state))
+    patches[image, k] = wp.vec3(x, y, wp.where(there < chance, radius * radius, -1.0))
 
 
 @wp.func
@@ -120,6 +122,7 @@ def spoil_depth(
     far: wp.float32,
     unit: wp.float32,
     lost: wp.float32,
+    patches: wp.array(dtype=wp.vec3, ndim=2),
     clean: wp.array(dtype=Any, ndim=3),
     spoilt: wp.array(dtype=Any, ndim=3),
 ):
@@ -143,13 +146,15 @@ def spoil_depth(
         left = wp.float32(clean[image, row, wp.max(column - 1, 0)]) * unit
         right = wp.float32(clean[image, row, wp.min(column + 1, width - 1)]) * unit
         gone = gone or wp.min(left, right) < z * (1.0 - wp.min(rules.edge_step, 0.99))
-    if rules.patches > 0.0 and not gone:
-        u = (float(column) + 0.5) / float(width)
-        v = (float(row) + 0.5) / float(width)
-        gone = in_patch(rules, key[image], u, v, float(height) / float(width), amplitude)
+    if rules.patches > 0.0:
+        at = wp.vec2((float(column) + 0.5) / float(width), (float(row) + 0.5) / float(width))
+        for k in range(PATCHES):
+            patch = patches[image, k]
+            away = at - wp.vec2(patch[0], patch[1])
+            gone = gone or wp.dot(away, away) < patch[2]
     if rules.surfaces > 0.0 and not gone and z < far:
-        at = position[image] + rotation[image] * look_through(row, column, height, width, tan_half) * z
-        gone = is_dead(rules, cameras.surfaces[camera], at, amplitude)
+        hit = position[image] + rotation[image] * look_through(row, column, height, width, tan_half) * z
+        gone = is_dead(rules, cameras.surfaces[camera], hit, amplitude)
     if z < far:
         z = z * cameras.scale[camera] * (1.0 + rules.noise * amplitude * z * normal)
     gone = gone or z < rules.range[0] or z >= rules.range[1]
