@@ -28,13 +28,13 @@ class GlidingHerd(BoxHerd):
     lift = 0.0
 
     def step(self, targets, rows=None):
-        for k in rows if rows is not None else range(len(self._walkers)):
-            walker, reader = self._walkers[k], self._readers[k]
-            walker.qpos[0] += 0.8 * CONTROL_DT
-            walker.qpos[2] = home_qpos()[2] + self.lift
-            walker.qpos[7:] = home_qpos()[7:]
+        for k in rows if rows is not None else range(len(self._robots)):
+            body, reader = self._robots[k], self._readers[k]
+            body.qpos[0] += 0.8 * CONTROL_DT
+            body.qpos[2] = home_qpos()[2] + self.lift
+            body.qpos[7:] = home_qpos()[7:]
             reader.clear()
-            mujoco.mj_forward(walker.model, walker.data)
+            mujoco.mj_forward(body.model, body.data)
             reader.look()
             reader.sum_up()
             self._read(k)

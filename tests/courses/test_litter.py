@@ -23,16 +23,16 @@ class PacingHerd(BoxHerd):
 
     def step(self, targets, rows=None):
         self.time += 1
-        for k, walker in enumerate(self._walkers):
-            heading = 2 * np.arctan2(walker.qpos[6], walker.qpos[3])
-            walker.qpos[:2] += 0.4 * CONTROL_DT * np.array([np.cos(heading), np.sin(heading)])
-            walker.qpos[2] = home_qpos()[2] - 0.005
-            walker.qpos[7:] = home_qpos()[7:]
+        for k, body in enumerate(self._robots):
+            heading = 2 * np.arctan2(body.qpos[6], body.qpos[3])
+            body.qpos[:2] += 0.4 * CONTROL_DT * np.array([np.cos(heading), np.sin(heading)])
+            body.qpos[2] = home_qpos()[2] - 0.005
+            body.qpos[7:] = home_qpos()[7:]
             if self.time % 25 < 12:  # the knee bends while the thigh turns: the foot rises straight up
-                walker.qpos[8:10] += 2 * self.lift, -4 * self.lift
-            walker.contacts.clear()
-            mujoco.mj_forward(walker.model, walker.data)
-            walker.contacts.look()
+                body.qpos[8:10] += 2 * self.lift, -4 * self.lift
+            body.contacts.clear()
+            mujoco.mj_forward(body.model, body.data)
+            body.contacts.look()
             self._readers[k].sum_up()
             self.fallen[k] = False
             self._read(k)

@@ -17,9 +17,6 @@ from vinl.config.versions import describe_environment
 from vinl.courses.evaluate import LocomotorResults
 from vinl.courses.robot_records import HEIGHT_NAMES
 
-_STEPS = (("dirty_steps", "dirty %", 1), ("dirty_foot_steps", "by feet %", 1))
-"""Columns for litter, in per cent, before the others."""
-
 _COLUMNS = (
     ("foot_block_per_m", "feet/m", 2),
     ("foot_front_block_per_m", "front", 2),
@@ -30,6 +27,15 @@ _COLUMNS = (
     ("trunk_over_blocks", "over", 2),
 )
 """Figures of the table: name, title, digits."""
+
+_LITTER_COLUMNS = (
+    ("dirty_steps", "dirty %", 1),
+    ("dirty_foot_steps", "by feet %", 1),
+    ("foot_block_per_m", "feet/m", 1),
+    ("leg_block_per_m", "legs/m", 1),
+    ("linear_velocity_rmse", "m/s", 3),
+)
+"""The same for litter; fractions of steps in per cent."""
 
 _GAIT = (
     ("cost_of_transport", "CoT", 1, 2),
@@ -77,7 +83,7 @@ def print_comparison(console: Console, compared: Mapping[str, LocomotorResults])
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("policy", overflow="fold", min_width=9)
     littered = all(r.config["ground"]["terrain"] == "litter" for r in compared.values())
-    columns = (*_STEPS, *_COLUMNS) if littered else _COLUMNS
+    columns = _LITTER_COLUMNS if littered else _COLUMNS
     for title in (*[title for _, title, _ in columns], "fell"):
         table.add_column(title, justify="right", no_wrap=True)
     for name, results in compared.items():
