@@ -37,7 +37,8 @@ def inside_mesh(plan: FloorPlan) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarr
         vertices (v, 3) float32 [m] and faces (f, 3).
     """
     rectangles = cover_cells(plan.inside)
-    low, high = plan.frame.xy(rectangles[:, :2] - 0.5), plan.frame.xy(rectangles[:, 2:] - 0.5)
+    half = plan.frame.resolution / 2
+    low, high = plan.frame.xy(rectangles[:, :2]) - half, plan.frame.xy(rectangles[:, 2:]) - half
     corners = np.stack([low, np.stack([high[:, 0], low[:, 1]], 1), high, np.stack([low[:, 0], high[:, 1]], 1)], 1)
     vertices = np.concatenate([corners, np.zeros((len(corners), 4, 1))], 2).reshape(-1, 3)
     faces = np.arange(len(corners))[:, None, None] * 4 + np.array([[0, 1, 2], [0, 2, 3]])
