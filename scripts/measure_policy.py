@@ -2,7 +2,7 @@
 
     python scripts/measure_policy.py assets/policies/rough [--commit HASH] [--no-homes]
 
-Takes five minutes on two cores, ten for a policy that sees.
+Takes minutes on two cores, longer for a policy that sees.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ LOCO = {
     "blocks_straight": f"{BLOCKS} --density 1.0 --commands straight",
     "blocks_navigator": f"{BLOCKS} --density 1.0 --commands navigator",
     "no_blocks": f"{BLOCKS} --density 0",
+    "bars": "eval-loco --terrain bars --height 0.05 0.10 0.15 0.20 --crossings 32 --seed 0",
+    "litter": "eval-loco --terrain litter --density 15 --robots 32 --seconds 20 --seed 0",
     "rooms": "eval-loco --terrain rooms --robots 72 --seconds 20 --seed 0 --density 1.0",
 }
 FORWARD = "_forward_only"
@@ -43,7 +45,17 @@ LOCO_FIGURES = (
     "foot_front_block_per_m",
     "foot_rear_block_per_m",
     "leg_block_per_m",
+    "trunk_over_blocks",
     "mean_level",
+    "clean_foot_crossings",
+    "clean_crossings",
+    "finished",
+    "foot_steps_per_crossing",
+    "leg_steps_per_crossing",
+    "dirty_steps",
+    "cost_of_transport",
+    "leg_leg_per_m",
+    "joint_overspeed",
 )
 CHAIN_FIGURES = ("success", "spl", "foot_collisions_per_m", "leg_contacts_per_m")
 
@@ -76,7 +88,7 @@ def main() -> None:
             continue
         figures = run(command, options.policy)
         if name in LOCO:
-            row |= {key: figures[key] for key in LOCO_FIGURES if figures[key] is not None}
+            row |= {key: figures[key] for key in LOCO_FIGURES if figures.get(key) is not None}
         else:
             row |= {key: figures[key]["mean"] for key in CHAIN_FIGURES} | {"falls": figures["falls"]}
         evaluation[name] = row
