@@ -198,5 +198,7 @@ class NavConfig:
             raise InputError(f"seed must lie between 0 and 2147483647, got {self.seed}")
         if self.camera is not None and self.camera.missing == "plane" and self.ppo.image_type == "uint8":
             raise InputError("camera.missing=plane needs ppo.image_type=float16: a byte has no room for the mark")
+        if self.network.places and self.previous == "action":
+            raise InputError("network.places needs previous=motion or both: the map follows the robot's own motion")
         if self.execution.snag > 0 and self.robot.min_speed >= 0:
             raise InputError("execution.snag needs a way back: set robot.min_speed below 0")

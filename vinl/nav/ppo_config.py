@@ -23,6 +23,8 @@ class NetworkConfig:
         embedding: numbers that goal and previous action become, each.
         hidden, layers: width and layers of the memory.
         memory: ``lstm``, or ``mlp``, which remembers nothing.
+        places: the network keeps a map of its own of where it has been and what its camera saw to be solid, and sees
+            the 4 m around it (``vinl.policies.own_map``); needs ``previous`` motion or both.
         values: width of a layer of the critic's own between feature and value; 0: none.
         privileged: the critic also sees the geodesic distance to the goal, which the robot does not know.
     """
@@ -34,6 +36,7 @@ class NetworkConfig:
     hidden: int = 512
     layers: int = 2
     memory: str = "lstm"
+    places: bool = False
     values: int = 0
     privileged: bool = False
 

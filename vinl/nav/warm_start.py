@@ -11,9 +11,11 @@ from safetensors.torch import load_file, save_file
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
 from vinl.nav.recurrent_model import RecurrentActorCritic
+from vinl.nav.robot_config import CameraConfig
 from vinl.policies.card import PolicyCard
 from vinl.policies.io import load_policy
 from vinl.policies.nav_actor import PREVIOUS_SIZE, NavActor
+from vinl.policies.own_map import MapGeometry
 
 CRITIC = "critic.safetensors"
 """File of a run beside its policy."""
@@ -33,7 +35,23 @@ def build_actor(config: NavConfig) -> NavActor:
         memory=n.memory,
         planes=n.planes,
         previous=PREVIOUS_SIZE * (2 if config.previous == "both" else 1),
+        places=_map_geometry(config).describe() if n.places else None,
         channels=2 if c is not None and c.missing == "plane" else 1,
+    )
+
+
+def _map_geometry(config: NavConfig) -> MapGeometry:
+    c, robot = config.camera or CameraConfig(), config.robot
+    return MapGeometry(
+        robot.min_speed,
+        robot.max_speed,
+        robot.max_yaw_rate,
+        robot.period,
+        c.hfov,
+        c.pitch_down,
+        c.far,
+        c.forward,
+        c.mount_height,
     )
 
 
