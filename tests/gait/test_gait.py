@@ -6,7 +6,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import torch
-from gliding import glide
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,6 +13,7 @@ from vinl.config.errors import InputError
 from vinl.gait.clock import OFFSETS, swing_fraction, unison, wanted_period
 from vinl.gait.config import GaitConfig
 from vinl.gait.footholds import plan_footholds
+from vinl.gait.gliding import glide
 from vinl.gait.ground_view import FieldView, build_ground_map
 from vinl.gait.leg import knee_from_foot
 from vinl.gait.path import GAIT_SIZE, gait_rows, swing_path
