@@ -6,7 +6,6 @@ import numpy as np
 import onnx
 import pytest
 import torch
-from torch import Tensor
 
 from vinl.cli.app import main
 from vinl.config.errors import InputError
@@ -15,12 +14,13 @@ from vinl.export.frames import explain_rows
 from vinl.export.onnx_file import build_model, read_metadata
 from vinl.export.parity import LIMIT, ExportedPolicy
 from vinl.export.policy import Exported, ParityError, export_policy
-from vinl.policies.card import locomotion_card
+from vinl.gait.observation import SENSED_TABLE
+from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.depth_actor import DepthActor
-from vinl.policies.depth_policy import DepthPolicy, State
+from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.identity import digest_weights
 from vinl.policies.io import list_policies, load_policy, save_policy
-from vinl.policies.networks import PolicyNetwork
+from vinl.policies.stepping_actor import SteppingActor
 from vinl.robot.aliengo import DEFAULT_POSE, JOINTS
 from vinl.robot.cameras import LOCOMOTION_CAMERA
 
@@ -117,38 +117,35 @@ def test_a_file_that_answers_otherwise_is_not_written(monkeypatch: pytest.Monkey
     assert {path.name for path in Path().iterdir()} == {"runs"}
 
 
-class ClockedActor(PolicyNetwork):
-    """A toy whose memory is the phase of a gait."""
-
-    image = None
-    state_names = ("gait_phase",)
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.arguments, self.observation_size, self.action_size = {}, 48, 12
-        self.layer = torch.nn.Linear(48, 12)
-
-    def initial_state(self, n: int, device: torch.device | str | None = None) -> State:
-        return (torch.full((1, n, 1), 0.95, device=device),)
-
-    def forward(self, depth: object, vector: Tensor, state: State, fresh: Tensor) -> tuple[Tensor, State]:
-        phase = torch.where(fresh[..., None], torch.full_like(state[0], 0.95), state[0])
-        return self.layer(vector) + torch.sin(2 * torch.pi * phase), ((phase + 0.1) % 1.0,)
-
-
-def test_a_gait_clock_is_an_input_and_an_output():
+@pytest.mark.slow
+def test_a_gait_is_an_input_and_an_output():
+    """With the whole planner of footholds in the file."""
     torch.manual_seed(0)
-    network = ClockedActor()
-    loaded = DepthPolicy(network, locomotion_card("clocked", network.describe(), scan=False))
-    Path("clock.onnx").write_bytes(build_model(loaded).SerializeToString())
-    file = ExportedPolicy("clock.onnx")
-    assert file.about["states"] == [
-        {"input": "gait_phase", "output": "gait_phase_next", "shape": [1, 1, 1], "start": pytest.approx(0.95)}
-    ]
-    observations = np.random.default_rng(0).normal(size=(12, 48)).astype(np.float32)
-    for observation in observations:
-        np.testing.assert_allclose(file.act(observation), loaded.act(observation[None])[0], atol=1e-5)
-    assert not np.allclose(file.act(observations[0]), file.act(observations[0]))
+    network = SteppingActor(vision="none", hidden=16, layers=1, actor=(16,), code="map")
+    network.requires_grad_(False)
+    network.head.weight.normal_(std=0.3)
+    network.velocity.weight.normal_(std=1.0)
+    card = PolicyCard("locomotion", "stepping", network.describe(), SENSED_TABLE.describe(), describe_action())
+    loaded = DepthPolicy(network, card)
+    Path("gait.onnx").write_bytes(build_model(loaded).SerializeToString())
+    file = ExportedPolicy("gait.onnx")
+    states = {state["input"]: (state["shape"], state["start"]) for state in file.about["states"]}
+    assert states == {
+        "hidden": ([1, 1, 16], 0.0),
+        "cell": ([1, 1, 16], 0.0),
+        "gait": ([1, 1, 37], 0.0),
+        "velocity": ([1, 1, 3], 0.0),
+        "begun": ([1, 1], 0.0),
+    }
+    random = np.random.default_rng(0)
+    still = np.zeros(SENSED_TABLE.size)
+    still[5], still[6] = -1.0, 1.0  # gravity, commanded forward speed 0.5 m/s
+    for _ in range(2):  # episodes
+        loaded.reset(1)
+        file.reset()
+        for _ in range(20):
+            observation = (still + 0.05 * random.normal(size=len(still))).astype(np.float32)
+            np.testing.assert_allclose(file.act(observation), loaded.act(observation[None])[0], atol=1e-5)
 
 
 def test_rows_explain_themselves():

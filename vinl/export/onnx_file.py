@@ -31,6 +31,8 @@ def build_model(policy: LocomotionPolicy | DepthPolicy) -> onnx.ModelProto:
     """
     step = Step(policy).eval()
     about = describe_step(policy, step)
+    with torch.no_grad():
+        step(*step.example())  # what modules keep once they have made it must not be made while it is traced
     with _quiet():
         program = torch.onnx.export(
             step,
@@ -40,6 +42,7 @@ def build_model(policy: LocomotionPolicy | DepthPolicy) -> onnx.ModelProto:
             dynamo=True,
             verbose=False,
             external_data=False,
+            custom_translation_table=_translations(),
         )
     assert program is not None
     model = program.model_proto
@@ -49,6 +52,16 @@ def build_model(policy: LocomotionPolicy | DepthPolicy) -> onnx.ModelProto:
     for key, value in about.items():
         model.metadata_props.add(key=key, value=json.dumps(value))
     return model
+
+
+def _translations() -> dict[Any, Any]:
+    """Operators that torch's exporter does not know."""
+    from onnxscript import opset20 as op
+
+    def hypot(a: Any, b: Any) -> Any:
+        return op.Sqrt(op.Add(op.Mul(a, a), op.Mul(b, b)))
+
+    return {torch.ops.prims.hypot.default: hypot}
 
 
 def read_metadata(properties: dict[str, str]) -> dict[str, Any]:

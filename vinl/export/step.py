@@ -19,6 +19,9 @@ OBSERVATION, DEPTH, ACTION = "observation", "depth", "action"
 MEMORY = ("hidden", "cell")
 """Names of what an LSTM remembers."""
 
+BEGUN = "begun"
+"""Name of the state that tells the first step of an episode, 0, from those after it, 1."""
+
 NEXT = "_next"
 """The output that is to be given back as the input ``hidden`` is called ``hidden_next``."""
 
@@ -39,8 +42,9 @@ class State:
 class Step(nn.Module):
     """A policy's network for one robot: image preparation inside, memory outside.
 
-    A network that remembers more than an LSTM does, such as the phase of its gait, lists it in ``state_names`` in the
-    order of its ``initial_state``; it then becomes inputs and outputs like any memory.
+    A network that remembers more than an LSTM does, such as its gait, lists all of it in ``state_names`` in the order
+    of its ``initial_state``; it then becomes inputs and outputs like any memory. What such a network begins with may
+    follow from what it observes first, so that it is told whether an episode begins: by one more state, ``BEGUN``.
 
     Args:
         policy: as ``load_policy`` gives it.
@@ -58,15 +62,18 @@ class Step(nn.Module):
         self.network = policy.network
         self.states: tuple[State, ...] = ()
         self.camera = policy.camera
-        self._sees = isinstance(policy, DepthPolicy)
+        self._sees, self._told = isinstance(policy, DepthPolicy), False
         if not self._sees:
             return
         network = cast(DepthNetwork, policy.network)
         start = network.initial_state(1, policy.device)
+        self._told = hasattr(network, "state_names")
         names = getattr(network, "state_names", MEMORY[: len(start)])
         if len(names) != len(start):
             raise InputError(f"{policy.card.name} remembers {len(start)} things, of which {len(names)} have a name")
         self.states = tuple(State(*pair) for pair in zip(names, start, strict=True))
+        if self._told:
+            self.states += (State(BEGUN, torch.zeros(1, 1, device=policy.device)),)
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -92,6 +99,10 @@ class Step(nn.Module):
         image, states = observation[:, :1, None], rest
         if self.camera is not None:
             image, states = prepare_depth(self.camera, rest[0]), rest[1:]
-        fresh = torch.zeros(1, 1, dtype=torch.bool)  # who begins an episode gives the states of the start
-        action, after = self.network(image[None], observation[None], states, fresh)
-        return (action[0], *after)
+        if not self._told:  # whoever begins an episode gives the states of the start, which is all that a memory needs
+            fresh = torch.zeros(1, 1, dtype=torch.bool)
+            action, after = self.network(image[None], observation[None], states, fresh)
+            return (action[0], *after)
+        *states, begun = states
+        action, after = self.network(image[None], observation[None], tuple(states), begun < 0.5)
+        return (action[0], *after, (begun + 1.0).clip(max=1.0))

@@ -208,7 +208,7 @@ def _choose_rates(xp: Any, config: GaitConfig, gait: GaitState, command: Any, bl
     total = 0.1 * ((rates - 1) / config.modulate) ** 2 + (apart / _APART) ** 2
     for k in range(_STEPS):
         at = (later + k * gait.period[:, None, None] - left[..., None]) * speed[:, None, None]
-        index = xp.clip((at - float(TRACK[0])) / float(TRACK[1] - TRACK[0]), 0, len(TRACK) - 1.001)
+        index = xp.clip((at - float(TRACK[0])) / float(TRACK[1] - TRACK[0]), 0.0, len(TRACK) - 1.001)
         below = xp.floor(index)
         part, low = index - below, to_index(xp, below)
         read = take_along(xp, cost, low, 2) * (1 - part) + take_along(xp, cost, low + 1, 2) * part

@@ -153,6 +153,11 @@ class SteppingActor(PolicyNetwork):
         gait = torch.zeros(1, n, sum(_GAIT_NUMBERS), device=device)
         return (*self.memory.initial_state(n, device), gait, torch.zeros(1, n, 3, device=device))
 
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """What the parts of ``initial_state`` are called in an exported file."""
+        return (*(("hidden", "cell") if self.memory.remembers else ()), "gait", "velocity")
+
     def unpack(self, state: State) -> Memory:
         """A state as what it means."""
         n = state[-1].shape[1]
