@@ -80,7 +80,7 @@ def test_it_walks_as_the_chain_does_without_vinl_and_torch(home: Path, exported:
     assert end == "success" and done.stdout.splitlines()[1] == "1 of 1 goals reached"
 
     plan, setup = load_floorplan("harbour_flat"), draw_setup_of_episode()
-    navigator = LearnedNavigator(load_policy("nav"), recover=False)
+    navigator = LearnedNavigator(load_policy("nav"))
     (episode,) = run_episodes(plan, [setup], load_policy("loco"), navigator, EvaluationConfig())
     assert episode.record.success
     # who touches something parts from the other: contacts are found in another order
@@ -170,7 +170,7 @@ def test_navigation_observes_as_vinl_does(example, exported, monkeypatch: pytest
             wanted.append(observation[0])
             return policy.last[None]
 
-    navigator = LearnedNavigator(Asked(), recover=False)
+    navigator = LearnedNavigator(Asked())
     plan = load_floorplan("harbour_flat")
     (route,) = draw_routes(plan, 1, EvaluationConfig())
     navigator.reset([Task(FreeSpace(plan), route)])

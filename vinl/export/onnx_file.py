@@ -56,7 +56,9 @@ def build_model(policy: LocomotionPolicy | DepthPolicy) -> onnx.ModelProto:
 
 def _translations() -> dict[Any, Any]:
     """Operators that torch's exporter does not know."""
-    from onnxscript import opset20 as op
+    from onnxscript import opset20
+
+    op: Any = opset20
 
     def hypot(a: Any, b: Any) -> Any:
         return op.Sqrt(op.Add(op.Mul(a, a), op.Mul(b, b)))

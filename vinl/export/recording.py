@@ -117,7 +117,7 @@ def record_steps(
     navigator: Navigator
     if policy.card.kind == "navigation":
         locomotion = load_policy(WALKER)
-        navigator = LearnedNavigator(recorder, config.navigation_period * CONTROL_DT, recover=False)
+        navigator = LearnedNavigator(recorder, config.navigation_period * CONTROL_DT)
     else:
         navigator = load_navigator("oracle", config)
     plan, robots = load_floorplan(PLAN), ROBOTS[policy.card.kind]
