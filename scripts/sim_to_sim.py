@@ -30,7 +30,8 @@ from vinl.courses.grounds import Ground, GroundConfig, build_ground
 from vinl.courses.herd import MAX_TILT, BoxHerd, Herd
 from vinl.courses.robot_records import RobotRecord, aggregate_robots
 from vinl.courses.trial import run_trial
-from vinl.loco.simulation import Body, Simulation
+from vinl.loco.randomisation import plain_traits
+from vinl.loco.simulation import PAST, Body, Simulation
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, STANDING_HEIGHT, home_qpos
@@ -61,8 +62,8 @@ class FieldHerd:
         self.touches, self.fallen = BlockContacts.none(n), np.zeros(n, bool)
         self._warm = np.zeros((n, 18), np.float32)
         foot = self._simulation.model.geom("FL_foot").id
-        self._friction = jnp.full(n, float(self._simulation.model.geom_friction[foot, 0]))
-        self._mass = jnp.zeros(n)
+        friction = jnp.full(n, float(self._simulation.model.geom_friction[foot, 0]))
+        self._traits, self._delay = plain_traits(n)._replace(friction=friction), jnp.zeros(n, jnp.int32)
         self._step = jax.jit(self._simulation.step)
 
     def start(self, robot: int, start: Start) -> None:
@@ -74,8 +75,8 @@ class FieldHerd:
     def step(self, targets: Float[np.ndarray, "n 12"]) -> None:
         """One control step to joint targets [rad]."""
         body = Body(*(jnp.asarray(x, jnp.float32) for x in (self.qpos, self.qvel, self._warm)))
-        target = jnp.asarray(targets, jnp.float32)
-        body, contacts, _ = self._step(self._simulation.ground, body, target, self._friction, self._mass)
+        past = jnp.repeat(jnp.asarray(targets, jnp.float32)[:, None], PAST, 1)
+        body, contacts, _ = self._step(self._simulation.ground, body, past, self._delay, self._traits)
         # copies: JAX's own arrays may not be written to
         self.qpos[:], self.qvel[:], self._warm[:] = (np.asarray(x) for x in body)
         upright = 1 - 2 * (self.qpos[:, 4] ** 2 + self.qpos[:, 5] ** 2)

@@ -1,14 +1,21 @@
 """A small training ground that compiles in seconds."""
 
 from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
 from types import ModuleType
 
 import jax
 import pytest
 
 from vinl.config.loader import load_config
+from vinl.gait.config import GaitConfig
+from vinl.gait.observation import STEPPING_TABLE
 from vinl.loco.config import LocoConfig
 from vinl.loco.environment import LocoEnvironment
+from vinl.policies.card import locomotion_card
+from vinl.policies.io import save_policy
+from vinl.policies.networks import StepActor
 
 SMALL = [
     "num_envs=8",
@@ -37,6 +44,14 @@ def small_config() -> LocoConfig:
     return load_config(LocoConfig, "loco/rough", SMALL)
 
 
+@pytest.fixture(scope="session")
+def walker(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An untrained policy that knows the gait of the trainings."""
+    network = StepActor(STEPPING_TABLE.size)
+    card = locomotion_card("walker", network.describe(), scan=False, gait=asdict(GaitConfig()))
+    return save_policy(tmp_path_factory.mktemp("policies") / "walker", network, card)
+
+
 @pytest.fixture
 def share_environment(monkeypatch: pytest.MonkeyPatch):
     """``share_environment(module, env)``: what the module trains starts one environment anew instead of making its own,
@@ -45,6 +60,8 @@ def share_environment(monkeypatch: pytest.MonkeyPatch):
     def share(module: ModuleType, env: LocoEnvironment) -> Callable[..., LocoEnvironment]:
         def start(config: LocoConfig = env.config) -> LocoEnvironment:
             env.set_rewards(config.rewards)
+            env.set_noise(1.0)
+            env.simulation.set_solid(True)
             env.state = jax.device_put(jax.jit(env._first_state)(jax.random.PRNGKey(config.seed)), jax.devices()[0])
             env.take_lost()
             return env

@@ -6,7 +6,12 @@ BLOCK_TILES = [
     "terrain.columns=2",
     "terrain.blocks=1",
     "terrain.walls=0",
+    "terrain.slope=0",
     "terrain.rough_slope=0",
+    "terrain.hurdles=0",
+    "terrain.bars=0",
+    "terrain.ghost=0",
+    "terrain.first_height=null",
     "terrain.discrete=0",
 ]
 """Four tiles, all of blocks."""

@@ -1,5 +1,6 @@
 """Commands within their ranges, levels that follow what a robot achieved."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -7,15 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vinl.config.errors import InputError
-from vinl.loco.commands import DRAWS, draw_commands
-from vinl.loco.config import AnnealConfig, CommandConfig, CurriculumConfig, RewardConfig
+from vinl.loco.commands import draw_commands
+from vinl.loco.config import AnnealConfig, CommandConfig, CurriculumConfig, RandomisationConfig, RewardConfig
 from vinl.loco.curriculum import next_levels
 
 
 def test_commands_keep_to_their_ranges_and_shares():
     config = CommandConfig(forward=(-0.5, 1.0), left=(-0.3, 0.3), yaw_rate=(-1.0, 0.5), hold=(1.0, 3.0))
-    u = np.random.default_rng(0).uniform(size=(4000, DRAWS))
-    command, left = (np.asarray(x) for x in draw_commands(config, jnp.asarray(u, jnp.float32)))
+    command, left = (np.asarray(x) for x in draw_commands(config, jax.random.PRNGKey(0), 4000))
     assert (command.min(0) >= np.array([-0.5, -0.3, -1.0]) - 1e-6).all()
     assert (command.max(0) <= np.array([1.0, 0.3, 0.5]) + 1e-6).all()
     assert left.min() >= 50 and left.max() <= 150
@@ -50,6 +50,12 @@ def test_robots_beyond_the_last_level_go_to_any(u):
     assert 0 <= level_after(9, 10, level=9, u=u) <= 9
 
 
+def test_noise_comes_late():
+    config = RandomisationConfig(noise_from=(0.4, 0.8))
+    assert [config.noise_at(f) for f in (0.0, 0.4, 0.6, 0.8, 1.0)] == pytest.approx([0, 0, 0.5, 1, 1])
+    assert RandomisationConfig().noise_at(0.0) == 1.0
+
+
 def test_settings_move_between_their_bounds():
     anneal = AnnealConfig(begin=0.5, end=0.9, rewards={"sigma": 0.1, "fall": -2.0}, entropy=0.0)
     first = RewardConfig(collision=-3.0)
@@ -69,6 +75,10 @@ def test_settings_move_between_their_bounds():
         (AnnealConfig, {"rewards": {"collisions": -1.0}}),
         (AnnealConfig, {"rewards": {"sigma": 0.0}}),
         (RewardConfig, {"floor": 1.0}),
+        (RandomisationConfig, {"latency": (0.0, 0.1)}),
+        (RandomisationConfig, {"kp_scale": (0.0, 1.0)}),
+        (RandomisationConfig, {"noise_from": (0.8, 0.4)}),
+        (RandomisationConfig, {"velocity_bias": -0.1}),
         (CurriculumConfig, {"promote": 0.2}),
     ],
 )

@@ -7,10 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from vinl.loco.environment import LocoEnvironment
-from vinl.loco.simulation import Body, Simulation
+from vinl.gait.observation import STEPPING_MAP_TABLE, insert_gait, observe_gait
+from vinl.gait.state import GaitState, feet_in_heading_frame, swings
+from vinl.loco.environment import PRIVILEGED, LocoEnvironment
+from vinl.loco.randomisation import plain_traits
+from vinl.loco.simulation import PAST, Body, Simulation
 from vinl.robot.aliengo import DEFAULT_POSE, home_qpos
-from vinl.robot.observation import NOISE, SCAN_POINTS, observe
+from vinl.robot.observation import observe
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
@@ -35,10 +38,71 @@ def test_observation_is_that_of_the_evaluation(fresh):
     qpos, qvel = np.asarray(state.body.qpos), np.asarray(state.body.qvel)
     ground = scan_ground(np, field.heights.reshape(-1), field.frame, qpos)
     expected = observe(np, qpos, qvel, np.asarray(state.command), np.asarray(state.action), ground)
-    noisy, exact = fresh.observe()
-    assert np.allclose(exact, expected, atol=1e-4)
-    assert (np.abs(np.asarray(noisy) - expected) <= NOISE + 1e-4).all()
-    assert np.abs(np.asarray(noisy) - expected)[:, -len(SCAN_POINTS) :].max() > 0.1
+    gait = GaitState(*(np.asarray(x) for x in state.walk.gait))
+    rows = observe_gait(np, fresh.config.gait, gait, feet_in_heading_frame(np, qpos))
+    expected = insert_gait(np, expected, rows)
+    seen = fresh.observe()
+    assert seen.exact.shape == (8, STEPPING_MAP_TABLE.size) and seen.privileged.shape == (8, PRIVILEGED)
+    assert np.allclose(seen.exact, expected, atol=1e-4)
+    np.testing.assert_allclose(seen.velocity, expected[:, :3] / 2.0, atol=1e-4)
+    noise = np.abs(np.asarray(seen.noisy) - expected)
+    c, measured = fresh.config.randomisation, slice(24, 36)  # joint speeds: noise and no bias
+    assert (noise[:, measured] <= c.observation_noise * STEPPING_MAP_TABLE.noise[measured] + 1e-4).all()
+    assert noise[:, measured].max() > 0.5 * c.observation_noise * STEPPING_MAP_TABLE.noise[measured].max()
+    scan = STEPPING_MAP_TABLE.place("height_scan")
+    assert 0.5 < noise[:, scan].max() / (c.map_noise * STEPPING_MAP_TABLE.noise[scan].max()) <= 1.001
+    turn = STEPPING_MAP_TABLE.place("base_angular_velocity")
+    bias = np.asarray(state.traits.angular_velocity_bias) * STEPPING_MAP_TABLE.scale[turn]
+    off = np.abs(np.asarray(seen.noisy)[:, turn] - expected[:, turn] - bias)
+    assert (off <= c.observation_noise * STEPPING_MAP_TABLE.noise[turn] + 1e-4).all()
+
+
+def test_without_noise_all_that_is_measured_is_exact(fresh):
+    fresh.set_noise(0.0)
+    try:
+        result = fresh.step(jnp.zeros((8, 12)))
+    finally:
+        fresh.set_noise(1.0)
+    assert np.array_equal(result.observations.noisy, result.observations.exact)
+    assert not np.array_equal(fresh.observe().noisy, fresh.observe().exact)
+
+
+def test_an_action_takes_effect_after_the_robots_latency(fresh):
+    """In air, a calf that is told to bend does so 0, 10 and 30 ms later."""
+    late = np.array([0.0, 0.01, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0], np.float32)
+    state = fresh.state
+    traits = plain_traits(8)._replace(latency=jnp.asarray(late))
+    body = state.body._replace(qpos=state.body.qpos.at[:, 2].add(3.0), qvel=jnp.zeros((8, 18)))
+    quiet = {"step": jnp.zeros(8, jnp.int32), "push_left": jnp.full(8, 99, jnp.int32)}
+    fresh.state = jax.device_put(state._replace(body=body, traits=traits, **quiet), jax.devices()[0])
+    bend = jnp.zeros((8, 12)).at[:, 2].set(-4.0)
+    moved = []
+    for _ in range(2):
+        start = np.asarray(fresh.state.body.qpos[:, 9])
+        fresh.step(bend)
+        moved.append(np.asarray(fresh.state.body.qpos[:, 9]) - start)
+    assert moved[0][0] < 1.5 * moved[0][1] < -0.01 and abs(moved[0][2]) < 0.2 * abs(moved[0][1])
+    assert moved[1][2] < -0.01  # 10 ms of the second control step were its own
+
+
+def test_the_gait_walks_on_its_own_clock_and_can_be_given(fresh):
+    told = jnp.tile(jnp.array([0.5, 0.0, 0.0]), (8, 1))
+    fresh.state = fresh.state._replace(command=told, command_left=jnp.full(8, 1000, jnp.int32))
+    swung = []
+    for _ in range(60):
+        fresh.step(jnp.zeros((8, 12)))
+        swung.append(np.asarray(swings(jnp, fresh.config.gait, fresh.state.walk.gait)))
+    swung = np.array(swung)
+    assert (swung[:, :, 0] == swung[:, :, 3]).mean() > 0.9  # diagonal legs together
+    assert 0.25 < swung.mean() < 0.5
+    measures = fresh.read_measures()
+    assert measures["foot_rmse"] > 0.03 and measures["swing_hits"] > 0.3  # they stand
+    given = fresh.state.walk.gait._replace(phases=jnp.full((8, 4), 0.9))
+    fresh.step(jnp.zeros((8, 12)), given)
+    period = np.asarray(fresh.state.walk.gait.period)[:, None]
+    going = np.asarray(fresh.state.life) > 0
+    ran = np.asarray(fresh.state.walk.gait.phases)
+    np.testing.assert_allclose(ran[going], (0.9 + 0.02 * np.asarray(given.rate) / period)[going], atol=2e-3)
 
 
 def test_robots_that_hold_the_default_pose_stand_for_a_second(fresh):
@@ -51,10 +115,11 @@ def test_robots_that_hold_the_default_pose_stand_for_a_second(fresh):
     assert fresh.read_measures()["reward"] == 0  # reading set the sums to zero
 
 
-def test_reward_is_the_sum_of_its_terms_and_never_negative(fresh):
+def test_reward_is_the_sum_of_its_terms_and_never_negative_but_for_a_fall(fresh):
     rng = np.random.default_rng(0)
-    rewards = [fresh.step(jnp.asarray(rng.normal(size=(8, 12)), jnp.float32)).reward for _ in range(5)]
-    assert min(float(r.min()) for r in rewards) >= 0
+    rewards = [fresh.step(jnp.asarray(0.1 * rng.normal(size=(8, 12)), jnp.float32)).reward for _ in range(5)]
+    fall = fresh.config.rewards.fall
+    assert min(float(r.min()) for r in rewards) >= fall
     measures = fresh.read_measures()
     terms = [value for name, value in measures.items() if name.startswith("reward/")]
     assert measures["reward"] >= sum(terms) - 1e-5  # clipped at zero from below
@@ -85,10 +150,10 @@ def test_physics_that_blew_up_never_reaches_the_learner(fresh):
     body = fresh.state.body
     fresh.state = fresh.state._replace(body=body._replace(qvel=body.qvel.at[2, 8].set(jnp.nan)))
     result = fresh.step(jnp.zeros((8, 12)).at[1].set(jnp.nan))
-    assert all(np.isfinite(np.asarray(x)).all() for x in result)
+    assert all(np.isfinite(np.asarray(x)).all() for x in jax.tree.leaves(result))
     assert fresh.read_measures()["not_finite"] >= 1
     again = fresh.step(jnp.zeros((8, 12)))
-    assert np.isfinite(np.asarray(again.observation)).all()
+    assert np.isfinite(np.asarray(again.observations.noisy)).all()
 
 
 def test_same_seed_same_robots(small_config, env):
@@ -105,16 +170,10 @@ def test_contacts_tell_blocks_from_walls_from_ground(small_config):
     sim = Simulation(field, 40.0, 2.0)
     poses = [home_qpos(0, 0, 0.37), home_qpos(0, 3, 0.52), home_qpos(0, -3, 0.37), home_qpos(3, 0, 2.0)]
     body = Body(jnp.asarray(np.stack(poses), jnp.float32), jnp.zeros((4, 18)), jnp.zeros((4, 18)))
-    step = jax.jit(sim.step)
+    step, still = jax.jit(sim.step), jnp.broadcast_to(jnp.asarray(DEFAULT_POSE, jnp.float32), (4, PAST, 12))
     seen = []
     for _ in range(10):
-        body, contacts, _ = step(
-            sim.ground,
-            body,
-            jnp.broadcast_to(jnp.asarray(DEFAULT_POSE, jnp.float32), (4, 12)),
-            jnp.ones(4),
-            jnp.zeros(4),
-        )
+        body, contacts, _ = step(sim.ground, body, still, jnp.zeros(4, jnp.int32), plain_traits(4))
         seen.append([np.asarray(x) for x in contacts])
     foot, shank, trunk, down, foot_block, shank_block, foot_wall, shank_wall = (
         np.any([s[k] for s in seen], 0) for k in range(8)

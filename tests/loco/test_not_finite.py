@@ -16,8 +16,10 @@ from vinl.loco.config import LocoConfig
 from vinl.loco.environment import LocoEnvironment
 from vinl.loco.lost import KEPT
 from vinl.loco.replay import LostState, load_lost, replay
+from vinl.loco.simulation import delay_steps
 from vinl.rl.not_finite import NotFiniteError, judge_losses
 from vinl.rl.run_folder import MAX_LOST, RunFolder
+from vinl.robot.aliengo import DEFAULT_POSE
 
 STAGE2 = ["num_envs=8", *BLOCK_TILES, "ppo.steps=4", "ppo.critic_warmup=1", "terrain.block_density=0.1"]
 
@@ -66,10 +68,10 @@ def test_stage_1_sets_the_robot_back_saves_it_and_goes_on(tmp_path, monkeypatch,
     check_run(tmp_path / "run", small_overrides, capsys)
 
 
-def test_stage_2_the_same_and_play_shows_what_went_wrong(tmp_path, monkeypatch, fresh, capsys):
+def test_stage_2_the_same_and_play_shows_what_went_wrong(tmp_path, monkeypatch, fresh, walker, capsys):
     run = tmp_path / "run"
     spoil(monkeypatch, {5: [3]})
-    check_run(run, ["--stage", "2", "--from", "rough", *STAGE2], capsys)
+    check_run(run, ["--stage", "2", "--from", str(walker), *STAGE2], capsys)
     assert np.isfinite(np.asarray(fresh.state.body.qpos)).all()
     file, video = str(run / "not_finite" / "000001.npz"), tmp_path / "film.gif"
     assert main(["replay-nan", "--state", file, "--simulator", "mujoco", "--steps", "1", "--video", str(video)]) == 0
@@ -82,8 +84,13 @@ def test_mjx_replays_the_very_step(fresh):
     """Physics step by physics step, the replay ends where the training's control step ends."""
     before, action = jax.tree.map(np.asarray, fresh.state), np.full(12, 0.1, np.float32)
     values = {name: getattr(before.body, name)[2] for name in ("qpos", "qvel", "warmstart")}
+    values |= {name: getattr(before, name)[2] for name in ("command", "level", "column", "step")}
+    traits = ("friction", "added_mass", "kp", "kd", "joint_friction")
+    values |= {name: getattr(before.traits, name)[2] for name in traits}
+    target = np.asarray(DEFAULT_POSE, np.float32) + 0.25 * action
     values |= {
-        name: getattr(before, name)[2] for name in ("command", "friction", "added_mass", "level", "column", "step")
+        "targets": np.stack([target, *before.targets[2, :2]]),
+        "delay": int(delay_steps(before.traits.latency)[2]),
     }
     values |= {"action": action, "last_action": before.action[2], "robot": 2, "iteration": 7, "seed": 1}
     fresh.step(jnp.broadcast_to(jnp.asarray(action), (8, 12)))
@@ -105,7 +112,7 @@ def test_actions_rewards_and_observations_count_too(fresh):
     fresh.simulation.ground = unseen  # what the scan reads; the physics has its own
     try:
         result = fresh.step(jnp.zeros((8, 12)))
-        assert all(np.isfinite(np.asarray(x)).all() for x in result)
+        assert all(np.isfinite(np.asarray(x)).all() for x in jax.tree.leaves(result))
     finally:
         fresh.simulation.ground = ground
     assert fresh.read_measures()["not_finite"] == 0
@@ -128,10 +135,12 @@ def test_actions_rewards_and_observations_count_too(fresh):
     assert fresh.read_measures()["not_finite"] == 24 and len(fresh.take_lost()) == KEPT
 
 
-def test_more_than_one_in_a_thousand_ends_the_training(tmp_path, monkeypatch, fresh, capsys):
+def test_more_than_one_in_a_thousand_ends_the_training(tmp_path, monkeypatch, fresh, walker, capsys):
     run = tmp_path / "run"
     spoil(monkeypatch, {5: [3, 4]})
-    assert main(["train-loco", "--device", "cpu", "--stage", "2", "--from", "rough", *STAGE2, "--out", str(run)]) == 1
+    assert (
+        main(["train-loco", "--device", "cpu", "--stage", "2", "--from", str(walker), *STAGE2, "--out", str(run)]) == 1
+    )
     error = capsys.readouterr().err
     lines = [line for line in error.splitlines() if line.startswith("error")]
     assert len(lines) == 1 and "2 of 32 robot steps in iteration 2" in lines[0] and str(run / "not_finite") in lines[0]
@@ -140,16 +149,16 @@ def test_more_than_one_in_a_thousand_ends_the_training(tmp_path, monkeypatch, fr
     assert main(["train-loco", "--device", "cpu", "--resume", str(run)]) == 0  # what is sound goes on
 
 
-def test_a_policy_that_is_not_finite_does_not_replace_the_checkpoint(tmp_path, monkeypatch, fresh):
+def test_a_policy_that_is_not_finite_does_not_replace_the_checkpoint(tmp_path, monkeypatch, fresh, walker):
     run = tmp_path / "run"
-    config = load_config(LocoConfig, "loco/teacher", [*STAGE2, "from_policy=rough", "iterations=1"])
+    config = load_config(LocoConfig, "loco/teacher", [*STAGE2, f"from_policy={walker}", "iterations=1"])
     assert training.train_locomotor(config, run)
     before = (run / "checkpoint.pt").read_bytes()
     real = training.TrainingRunner.resume
 
     def resume_broken(self):
         found = real(self)
-        torch.nn.init.constant_(self.alg.get_policy().encoder[0].bias, float("nan"))
+        torch.nn.init.constant_(self.alg.get_policy().mlp[0].bias, float("nan"))
         return found
 
     monkeypatch.setattr(training.TrainingRunner, "resume", resume_broken)

@@ -15,7 +15,7 @@ from vinl.world.grid import GridFrame
 from vinl.world.heightfield import GROUND
 from vinl.world.terrain import Terrain, TerrainConfig, build_terrain
 
-EXACT = SightConfig(position=0.0, angle=0.0, zoom=0.0, scale=0.0, noise=0.0, holes=0.0, delay=0.0)
+EXACT = SightConfig(position=0.0, angle=0.0, zoom=0.0, scale=0.0, noise=0.0, holes=0.0, delay=(0.0, 0.0))
 CAMERA = CameraConfig(width=16, height=16).record()
 
 
@@ -87,7 +87,7 @@ def test_the_bare_ground_has_no_blocks(terrain):
 
 
 def test_a_late_image_is_the_last_one_and_an_episode_has_no_past(terrain, poses):
-    mesh, late = terrain_mesh(terrain), replace(EXACT, delay=1.0)
+    mesh, late = terrain_mesh(terrain), replace(EXACT, delay=(0.02, 0.02))
     sight, prompt = (Sight(mesh, CAMERA, c, 6, "cpu", 1) for c in (late, EXACT))
     moved = poses.clone()
     moved[:, 2] += 0.05
@@ -120,7 +120,7 @@ def test_noise_holes_and_offsets_differ_from_robot_to_robot_and_repeat_with_the_
 
 
 def test_a_resumed_sight_sees_the_same(terrain, poses):
-    mesh, config = terrain_mesh(terrain), SightConfig(delay=0.5)
+    mesh, config = terrain_mesh(terrain), SightConfig(delay=(0.0, 0.04))
     one, two = (Sight(mesh, CAMERA, config, 6, "cpu", 1) for _ in range(2))
     moved = poses + torch.tensor([0.0, 0.02, 0.03, 0, 0, 0, 0])
     one.look(poses, None)

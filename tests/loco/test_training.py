@@ -13,9 +13,9 @@ import torch
 
 from vinl.cli.app import main
 from vinl.config.errors import InputError
+from vinl.gait.observation import STEPPING_TABLE
 from vinl.loco.training import train_locomotor
 from vinl.policies.io import load_policy
-from vinl.robot.observation import OBSERVATION_SIZE
 
 TRAIN = [sys.executable, "-m", "vinl.cli.app", "train-loco", "--device", "cpu"]
 
@@ -51,7 +51,7 @@ def test_killed_and_resumed_ends_with_the_very_weights_of_a_run_never_stopped(tm
     assert all(torch.equal(whole[name], parts[name]) for name in whole)
     policy = load_policy(killed)
     policy.reset(3)
-    assert np.isfinite(policy.act(np.zeros((3, OBSERVATION_SIZE), np.float32))).all()
+    assert np.isfinite(policy.act(np.zeros((3, STEPPING_TABLE.size), np.float32))).all()
     assert policy.card.samples == 40 * 8 * 4
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from vinl.world.heightfield import BLOCK
-from vinl.world.hurdles import draw_hurdles
+from vinl.world.hurdles import draw_bars, draw_hurdles
 from vinl.world.terrain import TILE, TerrainConfig, build_terrain
 
 
@@ -27,6 +27,18 @@ def test_rings_are_closed_and_keep_to_the_tile(seed: int) -> None:
     assert free[np.abs(points).max(-1) < 0.8].all()
     count = ndimage.label(free, output=np.zeros(free.shape, int))
     assert count == len(blocks) // 4 + 1  # the middle, what lies between two rings, and outside
+
+
+@given(st.integers(0, 10**6), st.floats(0.05, 0.25))
+def test_bars_reach_from_side_to_side(seed: int, depth: float) -> None:
+    blocks = draw_bars(np.random.default_rng(seed), TILE, 0.8, (0.1, 0.2), depth)
+    rows, boxes = blocks.rows, blocks.boxes()
+    assert len(blocks) >= 4 and np.ptp(rows[:, 2] % np.pi) < 1e-9 and np.allclose(rows[:, 4], depth)
+    assert np.abs(boxes.corners()).max() <= TILE / 2 + 1e-9 and rows[:, 3].min() > 0.8 * TILE
+    assert boxes.distances(np.zeros((1, 2))).min() >= 0.8 * np.sqrt(2) - 1e-9
+    # straight across they lie on both sides of the start
+    away = rows[:, :2] @ [np.cos(rows[0, 2] + np.pi / 2), np.sin(rows[0, 2] + np.pi / 2)]
+    assert away.min() < -0.8 < 0.8 < away.max()
 
 
 def test_a_terrain_of_hurdles_grows_with_the_level() -> None:

@@ -133,14 +133,21 @@ def test_heights_must_be_finite():
         HeightField(np.full((2, 2), np.nan, np.float32), np.zeros((2, 2), np.uint8), frame)
 
 
-def test_heights_grow_with_the_level():
-    config = replace(BLOCKS, first_height=(0.03, 0.06))
+def test_depth_grows_before_height():
+    config = replace(BLOCKS, first_height=(0.03, 0.06), depth=(0.05, 0.25), levels=5)
     terrain = build_terrain(config)
     rows = terrain.blocks.rows
     for k in range(1, config.levels):
         here = rows[np.abs(rows[:, None, :2] - terrain.starts[k, None, :, :2]).max(-1).min(1) <= TILE / 2]
         low, high = config.heights_at(k)
         assert low <= here[:, 5].min() and here[:, 5].max() <= high
+        assert np.allclose(here[:, 4], min(config.depth_at(k), 0.2))
+    assert [config.depth_at(k) for k in range(5)] == pytest.approx([0.05, 0.15, 0.25, 0.25, 0.25])
+    assert config.heights_at(2) == (0.03, 0.06) < config.heights_at(3) < config.heights_at(4)
     assert config.heights_at(0) == (0.03, 0.06) and config.heights_at(config.levels - 1) == pytest.approx((0.1, 0.2))
     with pytest.raises(InputError, match="terrain"):
         replace(BLOCKS, first_height=(0.2, 0.1))
+    with pytest.raises(InputError, match="depth"):
+        replace(BLOCKS, depth=(0.2, 0.1))
+    with pytest.raises(InputError, match="ghost"):
+        replace(BLOCKS, ghost=2.0)

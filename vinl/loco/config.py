@@ -6,11 +6,15 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
 from vinl.config.errors import InputError
+from vinl.gait.config import GaitConfig
 from vinl.loco.student_config import StudentConfig
 from vinl.robot.aliengo import KD, KP
 from vinl.world.terrain import TerrainConfig
 
 Range = tuple[float, float]
+
+MAX_LATENCY = 0.04
+"""Longest time from an observation to its action's effect that is simulated [s]: two control steps."""
 
 
 def _check_range(name: str, value: Range) -> None:
@@ -58,33 +62,45 @@ class RewardConfig:
         yaw_rate: exp(-error^2 / sigma) of the commanded turning rate.
         vertical_velocity: vertical speed squared.
         roll_pitch_rate: squared rates of roll and pitch.
+        orientation: squared tilt of the trunk.
+        base_height: squared error of the trunk's height over the feet that stand [m^2]; free near blocks, where the
+            legs need the room.
         torque: squared joint torques.
         joint_acceleration: squared joint accelerations.
+        joint_speed: squares of what joint speeds exceed 0.9 of the data sheet's by [(rad/s)^2].
         action_rate: squared change of the action.
+        foot_tracking: mean over the legs: of a foot that swings, how near it is to its path, where height counts only
+            if it is missing; of one that should stand, whether it touches.
+        clearance: height that swinging feet lack on their paths, summed over the legs [m].
+        swing_contact: feet that touch anything in the middle of their swing.
+        slip: squared speed of feet that should stand, up to 1 (m/s)^2 each.
         collision: shanks and trunk that touch anything.
-        air_time: seconds over 0.5 that a foot was in the air, at touch-down.
         obstacle_contact: feet that touch a block or wall.
         leg_contact: shanks that touch a block or wall (``collision`` counts them once more).
-        orientation: squared tilt of the trunk.
-        stand_still: joint angles away from the default pose while told to stand.
+        leg_crossing: legs that touch each other.
         fall: one fall (not multiplied by the control step).
         sigma: width of the tracking terms [(m/s)^2].
         floor: the sum of a step's terms is held to at least this for each second [legged_gym: 0].
     """
 
-    linear_velocity: float = 1.0
-    yaw_rate: float = 0.5
-    vertical_velocity: float = -2.0
+    linear_velocity: float = 1.5
+    yaw_rate: float = 0.75
+    vertical_velocity: float = -0.5
     roll_pitch_rate: float = -0.05
+    orientation: float = -0.5
+    base_height: float = 0.0
     torque: float = -1e-5
     joint_acceleration: float = -2.5e-7
+    joint_speed: float = 0.0
     action_rate: float = -0.01
+    foot_tracking: float = 3.0
+    clearance: float = 0.0
+    swing_contact: float = -0.5
+    slip: float = -0.2
     collision: float = -1.0
-    air_time: float = 1.0
     obstacle_contact: float = 0.0
     leg_contact: float = 0.0
-    orientation: float = 0.0
-    stand_still: float = 0.0
+    leg_crossing: float = 0.0
     fall: float = 0.0
     sigma: float = 0.25
     floor: float = 0.0
@@ -98,22 +114,38 @@ class RewardConfig:
 
 @dataclass(frozen=True)
 class RandomisationConfig:
-    """What differs from robot to robot and from start to start.
+    """What differs from robot to robot, from start to start, and between what happens and what is measured.
+
+    What a robot is like is drawn anew for every episode.
 
     Attributes:
         friction: range of the feet's friction [ViNL config: 0.5-1.25].
         added_mass: range of the mass added to the trunk [kg] [ViNL config: +-5, on a robot 4.3 kg lighter].
+        kp_scale, kd_scale: ranges of the factors of the joint gains.
+        joint_friction: range of the factor of the joints' dry friction and damping.
+        latency: range of the time from an observation to its action's effect [s], up to 0.04; in steps of the physics.
         push_speed: pushes set the trunk's velocity in the plane to a random one up to this [m/s].
         push_interval: time between pushes [s] [ViNL config: 15].
         start_xy: half-width of the square that robots start in [m].
-        start_joints: joint angles start within this share of the default pose.
+        start_joints: joint angles start within this fraction of the default pose.
         start_height: height of the trunk over the highest ground near the start [m].
         start_velocity: largest velocity of the trunk at the start [m/s and rad/s] [ViNL code: 0.5].
-        observation_noise: multiplier of the noise in the observation table.
+        observation_noise: multiplier of the noise that the observation table gives proprioception.
+        map_noise: the same for what is read from the map: height scan and foothold plan.
+        velocity_bias: standard deviation of the error of the observed base velocity that changes slowly [m/s].
+        velocity_bias_time: in which it changes [s].
+        angular_velocity_bias: largest constant error of each observed angular velocity [rad/s].
+        gravity_bias: largest constant error of each component of the observed direction of gravity.
+        noise_from: fractions of the training from which noise, biases and latency grow from nothing, and at which they
+            are all there: exact first.
     """
 
     friction: Range = (0.5, 1.25)
     added_mass: Range = (-5.0, 3.0)
+    kp_scale: Range = (1.0, 1.0)
+    kd_scale: Range = (1.0, 1.0)
+    joint_friction: Range = (1.0, 1.0)
+    latency: Range = (0.0, 0.0)
     push_speed: float = 1.0
     push_interval: float = 15.0
     start_xy: float = 0.6
@@ -121,16 +153,38 @@ class RandomisationConfig:
     start_height: float = 0.42
     start_velocity: float = 0.5
     observation_noise: float = 1.0
+    map_noise: float = 1.0
+    velocity_bias: float = 0.0
+    velocity_bias_time: float = 1.0
+    angular_velocity_bias: float = 0.0
+    gravity_bias: float = 0.0
+    noise_from: Range = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        _check_range("randomisation.friction", self.friction)
-        _check_range("randomisation.added_mass", self.added_mass)
-        if self.friction[0] <= 0:
-            raise InputError("randomisation.friction must be positive")
-        if self.push_interval <= 0:
-            raise InputError("randomisation.push_interval must be positive")
-        if self.observation_noise < 0:
-            raise InputError("randomisation.observation_noise must not be negative")
+        for name in ("friction", "added_mass", "kp_scale", "kd_scale", "joint_friction", "latency", "noise_from"):
+            _check_range(f"randomisation.{name}", getattr(self, name))
+        for name in ("friction", "kp_scale", "kd_scale"):
+            if getattr(self, name)[0] <= 0:
+                raise InputError(f"randomisation.{name} must be positive")
+        if self.joint_friction[0] < 0:
+            raise InputError("randomisation.joint_friction must not be negative")
+        if not 0 <= self.latency[0] <= self.latency[1] <= MAX_LATENCY:
+            raise InputError(f"randomisation.latency must lie between 0 and {MAX_LATENCY} s, got {list(self.latency)}")
+        if not 0 <= self.noise_from[0] <= self.noise_from[1] <= 1:
+            raise InputError(f"randomisation.noise_from are fractions of the training, got {list(self.noise_from)}")
+        if self.push_interval <= 0 or self.velocity_bias_time <= 0:
+            raise InputError("randomisation.push_interval and velocity_bias_time must be positive")
+        noises = ("observation_noise", "map_noise", "velocity_bias", "angular_velocity_bias", "gravity_bias")
+        for name in noises:
+            if getattr(self, name) < 0:
+                raise InputError(f"randomisation.{name} must not be negative")
+
+    def noise_at(self, fraction: float) -> float:
+        """How much of noise, biases and latency there is after a fraction of the training, from 0 to 1."""
+        begin, end = self.noise_from
+        if fraction >= end:
+            return 1.0
+        return max(fraction - begin, 0.0) / (end - begin)
 
 
 @dataclass(frozen=True)
@@ -180,7 +234,7 @@ class PpoConfig:
         init_std: standard deviation of the actions at the start, also after ``from_policy``.
         critic_warmup: in so many first updates only the critic learns: one that starts afresh beside a trained actor
             would otherwise teach it nonsense.
-        map: whether the actor sees the height scan; the critic always does.
+        scan: whether the actor sees the height scan beside its footholds, as a learned code; the critic always does.
         actor, critic, encoder: widths of the hidden layers.
         code: size of the map code that the encoder makes of the height scan [paper III-A].
         update: whose update: rsl_rl (rsl-rl's own), fast (the same numbers with fewer waits for the device; see
@@ -200,7 +254,7 @@ class PpoConfig:
     max_grad_norm: float = 1.0
     init_std: float = 1.0
     critic_warmup: int = 0
-    map: bool = True
+    scan: bool = False
     actor: tuple[int, ...] = (512, 256, 128)
     critic: tuple[int, ...] = (512, 256, 128)
     encoder: tuple[int, ...] = (128, 64)
@@ -267,6 +321,7 @@ class LocoConfig:
         seed: of everything random.
         episode_length: [s] [ViNL config: 20].
         kp, kd: joint gains [N m / rad, N m s / rad].
+        gait: clock, footholds and swing paths that robots are told, and rewarded for.
         ppo, anneal: not used by stage 3.
         student: stage 3 alone.
     """
@@ -279,6 +334,7 @@ class LocoConfig:
     episode_length: float = 20.0
     kp: float = KP
     kd: float = KD
+    gait: GaitConfig = field(default_factory=GaitConfig)
     terrain: TerrainConfig = field(default_factory=TerrainConfig)
     commands: CommandConfig = field(default_factory=CommandConfig)
     rewards: RewardConfig = field(default_factory=RewardConfig)

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, UInt8
+from jaxtyping import Array, Float, UInt8
 
-from vinl.loco.commands import DRAWS, draw_commands
-from vinl.loco.config import LocoConfig, RewardConfig
+from vinl.gait.observation import GAIT_ROWS, STEPPING_MAP_TABLE, insert_gait, observe_gait
+from vinl.gait.state import GaitState, feet_in_heading_frame
+from vinl.loco.commands import draw_commands
+from vinl.loco.config import MAX_LATENCY, LocoConfig, RandomisationConfig, RewardConfig
 from vinl.loco.curriculum import next_levels
 from vinl.loco.lost import KEPT, REASONS, Lost, keep_lost
 from vinl.loco.measures import TERMS, average_sums, sum_measures, tile_cover
+from vinl.loco.randomisation import split_by_name, uniform
 from vinl.loco.rewards import Motion, reward_terms
-from vinl.loco.simulation import Body, Contacts, Ground, Simulation
-from vinl.loco.state import State, count_steps, first_state, start_body, strip_weak_types
+from vinl.loco.simulation import Body, Contacts, Ground, Simulation, delay_steps
+from vinl.loco.state import State, begin_episode, count_steps, first_state, strip_weak_types
+from vinl.loco.walking import Steps, flatten_plan, go_on, local_heights
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
-from vinl.robot.observation import CLIP, NOISE, observe
+from vinl.robot.observation import CLIP, HEIGHT_SCAN, observe
 from vinl.robot.rotation import rotate_inverse
 from vinl.sensing.height_scan import scan_ground
+from vinl.world.clearance import FAR
 from vinl.world.terrain import build_terrain
 
 _EDGE = 2.0
@@ -30,25 +36,74 @@ _EDGE = 2.0
 MAX_SPEED = 150.0
 """A speed beyond this [m/s, rad/s] means that the physics blew up."""
 
+PRIVILEGED = 16 + 3 + 8
+"""Numbers that only the critic knows."""
+
+_VELOCITY = STEPPING_MAP_TABLE.place("base_linear_velocity")
+
 _UPSIDE = -0.3
 """Third component of the gravity vector in the trunk above which the robot has fallen: tilted by more than 72 deg."""
+
+
+class Observations(NamedTuple):
+    """What is observed of the present state; ``gait.observation.STEPPING_MAP_TABLE`` has the order of the first two.
+
+    Attributes:
+        noisy: (n, numbers) with noise and biases, for the actor.
+        exact: the same without, for the critic, and for a teacher.
+        privileged: (n, ``PRIVILEGED``) what only the critic knows beside them: contacts, the errors of what is
+            measured, what the robot is like, and whether blocks collide.
+        plan: (n, 20) the foothold plan that the gait follows, as ``walking.flatten_plan`` has it.
+        heights: (n, 741) of the ground at ``gait.local_map.POINTS`` above the floor that the feet stand on [m], in
+            stage 3; (n, 0) elsewhere. Plan, heights and the exact base velocity [m/s] in the trunk's frame,
+            ``velocity`` (n, 3), are what a student learns to read from images.
+        pose: (n, 7) position [m] and quaternion of the trunks.
+    """
+
+    noisy: Float[Array, "n numbers"]
+    exact: Float[Array, "n numbers"]
+    privileged: Float[Array, "n privileged"]
+    plan: Float[Array, "n 20"]
+    heights: Float[Array, "n points"]
+    velocity: Float[Array, "n 3"]
+    pose: Float[Array, "n 7"]
 
 
 class StepResult(NamedTuple):
     """What a step gives to the learner.
 
     Attributes:
-        observation: (n, numbers) with noise, for the actor; exact: the same without, for the critic.
+        observations: after the step.
         reward: (n,); done: (n,) 1 where fallen or out of time; timeout: (n,) 1 where out of time.
-        pose: (n, 7) position [m] and quaternion of the trunk, which belong to the observation.
     """
 
-    observation: Float[Array, "n numbers"]
-    exact: Float[Array, "n numbers"]
+    observations: Observations
     reward: Float[Array, " n"]
     done: UInt8[Array, " n"]
     timeout: UInt8[Array, " n"]
-    pose: Float[Array, "n 7"]
+
+
+class Settings(NamedTuple):
+    """What moves over a training; it travels as an argument, so that nothing is compiled anew.
+
+    Attributes:
+        rewards: weights and widths by their names in ``RewardConfig``.
+        noise: how much of noise, biases and latency there is, from 0 to 1.
+    """
+
+    rewards: dict[str, Any]
+    noise: np.float32
+
+
+class StepKeys(NamedTuple):
+    """Random states that a step draws from."""
+
+    state: Array
+    episode: Array
+    command: Array
+    level: Array
+    push: Array
+    velocity_error: Array
 
 
 class LocoEnvironment:
@@ -67,18 +122,20 @@ class LocoEnvironment:
     def __init__(self, config: LocoConfig, seed: int | None = None) -> None:
         self.config = config
         self.num_envs = config.num_envs
-        self.terrain = build_terrain(config.terrain)
-        self.simulation = Simulation(self.terrain.ground, config.kp, config.kd, self.terrain.blocks)
+        terrain = self.terrain = build_terrain(config.terrain)
+        self.simulation = Simulation(terrain.ground, config.kp, config.kd, terrain.blocks, terrain.tall)
         self.episode_steps = count_steps(config)
         device = jax.devices()[0]
-        self._starts = jax.device_put(jnp.asarray(self.terrain.starts, jnp.float32), device)
+        self._starts = jax.device_put(jnp.asarray(terrain.starts, jnp.float32), device)
         frame = self.simulation.frame
-        cover = tile_cover(self.terrain) if len(self.terrain.blocks) else np.zeros(self.terrain.starts.shape[:2])
+        cover = tile_cover(terrain) if len(terrain.blocks) else np.zeros(terrain.starts.shape[:2])
         self._cover = jax.device_put(jnp.asarray(cover, jnp.float32), device)
         self._edge = np.array([-frame.x0, -frame.y0]) - _EDGE
+        self._noise = STEPPING_MAP_TABLE.noise * _noise_of_rows(config.randomisation)
         self.set_rewards(config.rewards)
+        self.set_noise(1.0)
         self._step = jax.jit(self._advance, donate_argnums=(1, 2))
-        self._look = jax.jit(self._observations)
+        self._look = jax.jit(self._observe)
         key = jax.random.PRNGKey(config.seed if seed is None else seed)
         self.state: State = jax.device_put(jax.jit(self._first_state)(key), device)
         self._lost: Lost = jax.device_put(Lost.none(), device)
@@ -87,20 +144,28 @@ class LocoEnvironment:
         """Weights and widths from the next step on; a training may move them without compiling anew."""
         self._rewards = {name: np.float32(value) for name, value in asdict(rewards).items()}
 
+    def set_noise(self, fraction: float) -> None:
+        """How much of noise, biases and latency there is from the next step on, from 0 to 1."""
+        self._noise_now = np.float32(fraction)
+
     # ---- what the learner calls -----------------------------------------------------------------------------------
 
-    def observe(self) -> tuple[Float[Array, "n numbers"], Float[Array, "n numbers"]]:
-        """The observations of the present state, with noise and without."""
-        return self._look(self.simulation.ground, self.state)
+    def observe(self) -> Observations:
+        """The observations of the present state; copies that outlive the next step."""
+        return self._look(self.simulation.ground, self.state, self._settings)
 
-    def trunk_pose(self) -> Float[Array, "n 7"]:
-        """Position [m] and quaternion of the trunks in the present state; a copy that outlives the next step."""
-        return jnp.array(self.state.body.qpos[:, :7])
+    def step(self, action: Float[Array, "n 12"], gait: GaitState | None = None) -> StepResult:
+        """One control step; robots whose episode ends start anew at once. The old state is given up.
 
-    def step(self, action: Float[Array, "n 12"]) -> StepResult:
-        """One control step; robots whose episode ends start anew at once. The old state is given up."""
+        Args:
+            action: of the robots.
+            gait: that the robots follow, in place of the environment's own: a student keeps one by what it believes,
+                and what is planned for it must be planned for its clock. None: the environment's.
+        """
+        if gait is not None:
+            self.state = self.state._replace(walk=self.state.walk._replace(gait=gait))
         self.state, self._lost, result = self._step(
-            self.simulation.ground, self.state, self._lost, action, self._rewards
+            self.simulation.ground, self.state, self._lost, action, self._settings
         )
         return result
 
@@ -127,28 +192,68 @@ class LocoEnvironment:
 
     # ---- inside ---------------------------------------------------------------------------------------------------
 
+    @property
+    def _settings(self) -> Settings:
+        return Settings(self._rewards, self._noise_now)
+
     def _first_state(self, key: Array) -> State:
         return first_state(self.config, self._starts, key)
 
-    def _observations(
-        self, ground: Ground, state: State
-    ) -> tuple[Float[Array, "n numbers"], Float[Array, "n numbers"]]:
-        """With noise and without. The noise is the state's own, so that a state that is loaded observes the same."""
-        body = state.body
+    def _observe(self, ground: Ground, state: State, settings: Settings) -> Observations:
+        """The noise is the state's own, so that a state that is loaded observes the same."""
+        body, traits, c = state.body, state.traits, self.config.randomisation
         heights = scan_ground(jnp, ground.heights, self.simulation.frame, body.qpos)
-        exact = observe(jnp, body.qpos, body.qvel, state.command, state.action, heights)
-        noise = jax.random.uniform(jax.random.fold_in(state.key, 1), exact.shape)
-        return exact + self.config.randomisation.observation_noise * jnp.asarray(NOISE) * (2 * noise - 1), exact
+        plain = observe(jnp, body.qpos, body.qvel, state.command, state.action, heights)
+        rows = observe_gait(jnp, self.config.gait, state.walk.gait, feet_in_heading_frame(jnp, body.qpos))
+        exact = insert_gait(jnp, plain, rows)
+        noise = 2 * jax.random.uniform(jax.random.fold_in(state.key, 1), exact.shape) - 1
+        errors = {
+            "base_linear_velocity": state.velocity_error,
+            "base_angular_velocity": traits.angular_velocity_bias,
+            "projected_gravity": traits.gravity_bias,
+        }
+        bias = jnp.zeros_like(exact)
+        for name, error in errors.items():
+            place = STEPPING_MAP_TABLE.place(name)
+            bias = bias.at[:, place].set(error * STEPPING_MAP_TABLE.scale[place])
+        privileged = jnp.concatenate(
+            [
+                state.touching.astype(jnp.float32),
+                settings.noise * state.velocity_error / max(c.velocity_bias, 1e-6),
+                jnp.stack(
+                    [
+                        traits.friction - 1,
+                        traits.added_mass / 5,
+                        5 * (traits.kp - 1),
+                        5 * (traits.kd - 1),
+                        traits.joint_friction - 1,
+                        settings.noise * traits.latency / MAX_LATENCY,
+                        jnp.where(ground.solid, 1.0, 0.0) + 0 * traits.kp,
+                        settings.noise + 0 * traits.kp,
+                    ],
+                    1,
+                ),
+            ],
+            1,
+        )
+        noisy = exact + settings.noise * (jnp.asarray(self._noise) * noise + bias)
+        floor = jnp.zeros((self.num_envs, 0))
+        if self.config.stage == 3:
+            floor = local_heights(self.config.gait, ground, self.simulation.frame, state.walk.gait, body)
+        velocity = exact[:, _VELOCITY] / STEPPING_MAP_TABLE.scale[_VELOCITY]
+        plan = flatten_plan(state.walk.plan)
+        return Observations(noisy, exact, privileged, plan, floor, velocity, body.qpos[:, :7] + 0.0)
 
     def _advance(
-        self, ground: Ground, old: State, lost: Lost, given: Float[Array, "n 12"], rewards: dict[str, Any]
+        self, ground: Ground, old: State, lost: Lost, given: Float[Array, "n 12"], settings: Settings
     ) -> tuple[State, Lost, StepResult]:
-        c, n = self.config, self.num_envs
-        key, draw = jax.random.split(old.key)
-        u = jax.random.uniform(draw, (n, 40))
+        c, n, rewards = self.config, self.num_envs, settings.rewards
+        keys = split_by_name(StepKeys, old.key)
         action = jnp.clip(jnp.nan_to_num(given), -CLIP, CLIP)
         target = jnp.asarray(DEFAULT_POSE, jnp.float32) + ACTION_SCALE * action
-        body, contacts, torque = self.simulation.step(ground, old.body, target, old.friction, old.added_mass)
+        targets = jnp.concatenate([target[:, None], old.targets[:, :-1]], 1)
+        delay = delay_steps(settings.noise * old.traits.latency)
+        body, contacts, torque = self.simulation.step(ground, old.body, targets, delay, old.traits)
 
         # what is not finite counts as a fall and never reaches the learner
         wrong = {
@@ -161,14 +266,15 @@ class LocoEnvironment:
         body = Body(*(jnp.where(broken[:, None], last, now) for now, last in zip(body, old.body, strict=True)))
         torque = jnp.where(broken[:, None], 0.0, torque)
 
-        motion, touching = self._motion(old, body, contacts, torque, action, broken)
+        walk, steps = go_on(c.gait, ground, self.simulation.frame, old.walk, old.body, body, old.command)
+        motion = self._motion(ground, old, body, contacts, torque, action, broken, steps)
         terms = reward_terms(motion, rewards["sigma"])
         weighted = {name: terms[name] * (rewards[name] * CONTROL_DT) for name in TERMS}
         wrong["reward"] = ~jnp.isfinite(jnp.sum(jnp.stack(list(weighted.values())), 0))
         broken, motion = broken | wrong["reward"], motion._replace(fallen=motion.fallen | wrong["reward"])
         weighted = {name: jnp.where(wrong["reward"], 0.0, value) for name, value in weighted.items()}
         weighted["fall"] = motion.fallen * rewards["fall"]
-        lost = keep_lost(lost, jnp.stack([wrong[name] for name in REASONS]), old, given)
+        lost = keep_lost(lost, jnp.stack([wrong[name] for name in REASONS]), old, given, targets, delay)
         total = jnp.sum(jnp.stack([value for name, value in weighted.items() if name != "fall"]), 0)
         floor = rewards["floor"] * CONTROL_DT
         clipped = total < floor
@@ -193,68 +299,87 @@ class LocoEnvironment:
             way,
             commanded,
             jnp.maximum(life, 1) / self.episode_steps,
-            u[:, 35],
+            jax.random.uniform(keys.level, (n,)),
             hits,
         )
         moved = jnp.linalg.norm(body.qpos[:, :2] - old.body.qpos[:, :2], axis=1)
-        over = self.simulation.over_block(ground, body.qpos[:, :2])
+        over = self.simulation.block_distance(ground, body.qpos[:, :2]) < 0
         cover = self._cover[old.level, old.column]
         sums = sum_measures(motion, old.level, reward, weighted, clipped, moved, timeout, life, broken, over, cover)
 
-        # pushes, new starts, new commands
+        # pushes, errors of what is measured, new starts, new commands
         push = old.push_left <= 0
-        shove = c.randomisation.push_speed * (2 * u[:, 36:38] - 1)
+        shove = uniform(keys.push, (n, 2), (-c.randomisation.push_speed, c.randomisation.push_speed))
         body = body._replace(qvel=jnp.where(push[:, None], body.qvel.at[:, :2].set(shove), body.qvel))
+        kept = math.exp(-CONTROL_DT / c.randomisation.velocity_bias_time)
+        fresh_error = c.randomisation.velocity_bias * jax.random.normal(keys.velocity_error, (n, 3))
         level = jnp.where(done, level, old.level)
-        fresh = start_body(c.randomisation, self._starts, level, old.column, u[:, :22])
-        command, left = draw_commands(c.commands, u[:, 22 : 22 + DRAWS])
+        start = begin_episode(c, self._starts, level, old.column, keys.episode)
+        command, left = draw_commands(c.commands, keys.command, n)
         renew = done | (old.command_left <= 0)
 
-        def ended(start: Array, going: Array) -> Array:
-            return jnp.where(done.reshape((n,) + (1,) * (going.ndim - 1)), start, going)
+        def ended(beginning: Any, going: Any) -> Any:
+            """What begins where an episode has ended, what goes on elsewhere."""
+            return jax.tree.map(
+                lambda a, b: jnp.where(done.reshape((n,) + (1,) * (b.ndim - 1)), a, b), beginning, going
+            )
 
         state = State(
-            key=key,
-            body=Body(*(ended(start, going) for start, going in zip(fresh, body, strict=True))),
+            key=keys.state,
+            body=ended(start.body, body),
             action=ended(jnp.zeros_like(action), action),
+            targets=ended(start.targets, targets),
+            walk=ended(start.walk, walk),
             command=jnp.where(renew[:, None], command, old.command),
             command_left=jnp.where(renew, left, old.command_left - 1),
             push_left=jnp.where(push, round(c.randomisation.push_interval / CONTROL_DT), old.push_left - 1),
             step=jnp.where(done, 0, step),
             life=jnp.where(done, 0, life),
-            air_time=ended(jnp.zeros((n, 4)), motion.air_time * ~touching),
             touched=ended(jnp.zeros((n, 4), bool), contacts.foot),
+            flying=ended(jnp.zeros((n, 4), bool), ~(contacts.foot | old.touched)),
+            touching=ended(
+                jnp.zeros((n, 16), bool),
+                jnp.concatenate([contacts.foot, contacts.shank, contacts.foot_block, contacts.shank_block], 1),
+            ),
+            velocity_error=ended(
+                start.velocity_error, kept * old.velocity_error + math.sqrt(1 - kept**2) * fresh_error
+            ),
             way=jnp.where(done, 0.0, way),
             commanded=jnp.where(done, 0.0, commanded),
             hits=jnp.where(done, 0.0, hits),
             level=level,
             column=old.column,
-            friction=old.friction,
-            added_mass=old.added_mass,
+            traits=ended(start.traits, old.traits),
             sums=old.sums + sums,
         )
         state = strip_weak_types(state)
-        noisy, exact = self._observations(ground, state)
-        blind = ~jnp.isfinite(exact.sum(1))
-        noisy, exact = (jnp.where(blind[:, None], 0.0, x) for x in (noisy, exact))
+        seen = self._observe(ground, state, settings)
+        blind = ~jnp.isfinite(jnp.concatenate([seen.exact, seen.privileged, seen.plan, seen.heights], 1).sum(1))
+        shown = Observations(*(jnp.where(blind[:, None], 0.0, x) for x in seen))._replace(pose=seen.pose)
         state = state._replace(life=jnp.where(blind, -1, state.life))  # the next step sets the robot back
-        ends = done.astype(jnp.uint8), timeout.astype(jnp.uint8)
-        return state, lost, StepResult(noisy, exact, reward, *ends, state.body.qpos[:, :7])
+        return state, lost, StepResult(shown, reward, done.astype(jnp.uint8), timeout.astype(jnp.uint8))
 
     def _motion(
-        self, old: State, body: Body, contacts: Contacts, torque: Array, action: Array, broken: Array
-    ) -> tuple[Motion, Bool[Array, "n 4"]]:
-        """What the rewards look at, and which feet count as on the ground (now or a step ago [legged_gym])."""
+        self,
+        ground: Ground,
+        old: State,
+        body: Body,
+        contacts: Contacts,
+        torque: Array,
+        action: Array,
+        broken: Array,
+        steps: Steps,
+    ) -> Motion:
+        """What the rewards look at; a foot counts as on the ground now or a step ago [legged_gym]."""
         quaternion = body.qpos[:, 3:7]
         down = jnp.broadcast_to(jnp.array([0.0, 0.0, -1.0]), (self.num_envs, 3))
         gravity = rotate_inverse(jnp, quaternion, down)
-        touching = contacts.foot | old.touched
-        linear, angular = rotate_inverse(jnp, quaternion, body.qvel[:, :3]), body.qvel[:, 3:6]
-        motion = Motion(
-            linear=linear,
-            angular=angular,
+        near_block = self.simulation.block_distance(ground, body.qpos[:, :2]) < FAR
+        return Motion(
+            linear=rotate_inverse(jnp, quaternion, body.qvel[:, :3]),
+            angular=body.qvel[:, 3:6],
             gravity=gravity,
-            joints=body.qpos[:, 7:],
+            height_error=jnp.where(near_block, 0.0, steps.height - self.config.gait.hip_height),
             joint_speed=body.qvel[:, 6:],
             last_joint_speed=old.body.qvel[:, 6:],
             torque=torque,
@@ -262,8 +387,22 @@ class LocoEnvironment:
             last_action=old.action,
             command=old.command,
             contacts=contacts,
-            air_time=old.air_time + CONTROL_DT,
-            landed=(old.air_time > 0) & touching,
+            landed=old.flying & (contacts.foot | old.touched),
+            path_error=steps.path_error,
+            swing=steps.swing,
+            middle=steps.middle,
+            blocked=steps.blocked,
+            foot_speed=steps.speed,
             fallen=contacts.trunk_down | (gravity[:, 2] > _UPSIDE) | broken,
         )
-        return motion, touching
+
+
+def _noise_of_rows(config: RandomisationConfig) -> Float[np.ndarray, " numbers"]:
+    """Multiplier of the table's noise for every number: what is measured, and what is read from the map."""
+    of_map = {HEIGHT_SCAN.name, *(term.name for term in GAIT_ROWS)}
+    return np.concatenate(
+        [
+            np.full(term.size, config.map_noise if term.name in of_map else config.observation_noise, np.float32)
+            for term in STEPPING_MAP_TABLE
+        ]
+    )

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
+
+from vinl.loco.simulation import PAST
+from vinl.loco.state import State
 
 KEPT = 16
 """How many states are kept until they are taken; later ones are only counted."""
@@ -24,7 +27,9 @@ class Lost(NamedTuple):
         qpos: (k, 19), qvel: (k, 18), warmstart: (k, 18) as in ``simulation.Body``.
         action, last_action: (k, 12) of the step that went wrong and of the one before it.
         command: (k, 3).
-        friction, added_mass: (k,) of the robot.
+        targets: (k, past, 12) joint targets of that step and of those before it [rad].
+        delay: (k,) physics steps until a target takes effect.
+        friction, added_mass, kp, kd, joint_friction: (k,) of the robot, as in ``randomisation.Traits``.
         level, column: (k,) tile; step: (k,) of the episode.
     """
 
@@ -37,8 +42,13 @@ class Lost(NamedTuple):
     action: Float[Array, "k 12"]
     last_action: Float[Array, "k 12"]
     command: Float[Array, "k 3"]
+    targets: Float[Array, "k past 12"]
+    delay: Int[Array, " k"]
     friction: Float[Array, " k"]
     added_mass: Float[Array, " k"]
+    kp: Float[Array, " k"]
+    kd: Float[Array, " k"]
+    joint_friction: Float[Array, " k"]
     level: Int[Array, " k"]
     column: Int[Array, " k"]
     step: Int[Array, " k"]
@@ -55,18 +65,27 @@ class Lost(NamedTuple):
 
         return cls(
             jnp.zeros((), jnp.int32), whole(), whole(), numbers(19), numbers(18), numbers(18), numbers(12),
-            numbers(12), numbers(3), numbers(), numbers(), whole(), whole(), whole(),
+            numbers(12), numbers(3), numbers(PAST, 12), whole(), numbers(), numbers(), numbers(), numbers(), numbers(),
+            whole(), whole(), whole(),
         )  # fmt: skip
 
 
-def keep_lost(lost: Lost, wrong: Bool[Array, "reasons n"], state: Any, action: Float[Array, "n 12"]) -> Lost:
+def keep_lost(
+    lost: Lost,
+    wrong: Bool[Array, "reasons n"],
+    state: State,
+    action: Float[Array, "n 12"],
+    targets: Float[Array, "n past 12"],
+    delay: Int[Array, " n"],
+) -> Lost:
     """Add the robots of a step that went wrong.
 
     Args:
         lost: those before.
         wrong: what went wrong with whom, in the order of ``REASONS``.
-        state: ``state.State`` before the step.
+        state: before the step.
         action: of the step, as the policy gave it.
+        targets, delay: of the step, as ``Simulation.step`` was given them.
     """
     gone, n = wrong.any(0), wrong.shape[1]
     robot = jnp.nonzero(gone, size=KEPT, fill_value=n)[0].astype(jnp.int32)
@@ -82,8 +101,13 @@ def keep_lost(lost: Lost, wrong: Bool[Array, "reasons n"], state: Any, action: F
         action=action,
         last_action=state.action,
         command=state.command,
-        friction=state.friction,
-        added_mass=state.added_mass,
+        targets=targets,
+        delay=delay,
+        friction=state.traits.friction,
+        added_mass=state.traits.added_mass,
+        kp=state.traits.kp,
+        kd=state.traits.kd,
+        joint_friction=state.traits.joint_friction,
         level=state.level,
         column=state.column,
         step=state.step,

@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 from vinl.loco.config import RewardConfig
 from vinl.loco.rewards import Motion
 from vinl.loco.simulation import FEET
-from vinl.robot.aliengo import CONTROL_DT
+from vinl.robot.aliengo import CONTROL_DT, JOINT_SPEED_LIMIT
 from vinl.world.heightfield import BLOCK
 from vinl.world.terrain import RESOLUTION, TILE, Terrain
 
@@ -42,6 +42,12 @@ MEASURES = (
     "not_finite",
     "level",
     "clipped",
+    "crossing",
+    "too_fast",
+    "swings",
+    "foot_error2",
+    "swing_hits",
+    "blocked",
 )
 """Sums over robots and steps, before the reward terms."""
 
@@ -82,6 +88,12 @@ def sum_measures(
         "not_finite": broken,
         "level": level,
         "clipped": clipped,
+        "crossing": m.contacts.crossing,
+        "too_fast": (jnp.abs(m.joint_speed) > jnp.asarray(JOINT_SPEED_LIMIT, jnp.float32)).any(1),
+        "swings": m.swing.sum(1),
+        "foot_error2": jnp.sum(m.path_error**2, (1, 2)),
+        "swing_hits": (m.middle & m.contacts.foot).sum(1),
+        "blocked": m.blocked.sum(1),
     }
     ordered = [values[name] for name in MEASURES] + [weighted[name] for name in TERMS]
     return jnp.stack([jnp.sum(jnp.nan_to_num(value), dtype=jnp.float32) for value in ordered])
@@ -109,6 +121,11 @@ def average_sums(sums: Float[np.ndarray, " m"]) -> dict[str, float]:
         "trunk_over_blocks": raw["over_block"] / max(raw["covered"], 1.0),
         "stride": FEET * raw["metres"] / max(raw["landings"], 1.0),
         "clipped": raw["clipped"] / steps,
+        "leg_crossing": raw["crossing"] / steps,
+        "too_fast": raw["too_fast"] / steps,
+        "foot_rmse": math.sqrt(raw["foot_error2"] / max(raw["swings"], 1.0)),
+        "swing_hits": raw["swing_hits"] / max(raw["swings"], 1.0),
+        "plan_blocked": raw["blocked"] / max(raw["swings"], 1.0),
         "not_finite": raw["not_finite"],
         **{name: value / steps / CONTROL_DT for name, value in raw.items() if name.startswith("reward/")},
     }

@@ -20,9 +20,9 @@ from vinl.config.loader import build_config
 from vinl.loco.config import LocoConfig
 from vinl.loco.environment import MAX_SPEED
 from vinl.loco.lost import Lost
-from vinl.loco.simulation import Simulation
-from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, FOOT_GEOMS, JOINTS, SUBSTEPS
-from vinl.robot.observation import CLIP
+from vinl.loco.randomisation import Traits, plain_traits
+from vinl.loco.simulation import Body, Simulation, target_age, torque_range
+from vinl.robot.aliengo import FOOT_GEOMS, JOINTS, SUBSTEPS
 from vinl.world.heightfield import HeightField
 from vinl.world.terrain import build_terrain
 
@@ -110,13 +110,11 @@ def replay(state: LostState, steps: int = 5, simulator: str = "mjx") -> Replay:
     if simulator not in SIMULATORS:
         raise InputError(f"--simulator {simulator!r} is unknown; known: {', '.join(SIMULATORS)}")
     terrain = build_terrain(state.config.terrain)
-    simulation = Simulation(terrain.ground, state.config.kp, state.config.kd, terrain.blocks)
+    simulation = Simulation(terrain.ground, state.config.kp, state.config.kd, terrain.blocks, terrain.tall)
     v = state.values
-    action = np.clip(np.nan_to_num(v["action"]), -CLIP, CLIP)
-    target = np.asarray(DEFAULT_POSE) + ACTION_SCALE * action
     rows = [(v["qpos"], v["qvel"], np.zeros(18), np.zeros(12))]
     wrong = _look(0, *rows[0], action=v["action"])
-    advance = (_mjx_steps if simulator == "mjx" else _mujoco_steps)(simulation, v, target)
+    advance = (_mjx_steps if simulator == "mjx" else _mujoco_steps)(simulation, v)
     if all(np.isfinite(x).all() for x in rows[0]):
         for k, row in zip(range(1, steps * SUBSTEPS + 1), advance, strict=False):
             rows.append(row)
@@ -130,32 +128,53 @@ def replay(state: LostState, steps: int = 5, simulator: str = "mjx") -> Replay:
 Row = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
-def _mjx_steps(simulation: Simulation, v: dict[str, Any], target: np.ndarray) -> Iterator[Row]:
-    """Physics steps in MJX, as in the training but for the processor's rounding."""
-    names = ("qpos", "qvel", "warmstart", "friction", "added_mass")
-    qpos, qvel, warm, friction, mass = (jnp.asarray(v[name], jnp.float32) for name in names)
-    goal = jnp.asarray(target, jnp.float32)
+def _traits(v: dict[str, Any]) -> Traits:
+    """Of the robot; what is only measured is left out."""
+    plain = jax.tree.map(lambda x: x[0], plain_traits(1))
+    names = ("friction", "added_mass", "kp", "kd", "joint_friction")
+    return plain._replace(**{name: jnp.asarray(v[name], jnp.float32) for name in names})
 
-    def once(ground: Any, qpos: Any, qvel: Any, warm: Any) -> Any:
-        data = simulation.physics_step(simulation.robot_model(ground, friction, mass), qpos, qvel, warm, goal)
-        return data.qpos, data.qvel, data.qacc_warmstart, data.qacc, data.actuator_force
+
+def _targets(v: dict[str, Any]) -> Iterator[np.ndarray]:
+    """(12,) joint targets [rad] of each physics step, the last action held."""
+    targets, k = np.asarray(v["targets"]), 0
+    while True:
+        yield targets[int(target_age(jnp.asarray(k), jnp.asarray(int(v["delay"]))))]
+        k += 1
+
+
+def _mjx_steps(simulation: Simulation, v: dict[str, Any]) -> Iterator[Row]:
+    """Physics steps in MJX, as in the training but for the processor's rounding."""
+    body = Body(*(jnp.asarray(v[name], jnp.float32) for name in ("qpos", "qvel", "warmstart")))
+    traits = _traits(v)
+
+    def once(ground: Any, body: Body, target: Any) -> Any:
+        data = simulation.physics_step(simulation.robot_model(ground, traits), body, target)
+        return Body(data.qpos, data.qvel, data.qacc_warmstart), data.qacc, data.actuator_force
 
     step: Callable[..., Any] = jax.jit(once)
-    while True:
-        qpos, qvel, warm, acceleration, torque = step(simulation.ground, qpos, qvel, warm)
-        yield tuple(np.asarray(x, np.float64) for x in (qpos, qvel, acceleration, torque))  # type: ignore[misc]
+    for target in _targets(v):
+        body, acceleration, torque = step(simulation.ground, body, jnp.asarray(target, jnp.float32))
+        yield tuple(np.asarray(x, np.float64) for x in (body.qpos, body.qvel, acceleration, torque))  # type: ignore[misc]
 
 
-def _mujoco_steps(simulation: Simulation, v: dict[str, Any], target: np.ndarray) -> Iterator[Row]:
+def _mujoco_steps(simulation: Simulation, v: dict[str, Any]) -> Iterator[Row]:
     """Physics steps in MuJoCo C: spheres on the same height field, float64."""
     model = simulation.model
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD  # as in chain/scene.py
     for foot in FOOT_GEOMS:
         model.geom(foot).friction[0] = float(v["friction"])
     model.body("trunk").mass[0] += float(v["added_mass"])
+    model.actuator_gainprm[:, 0] *= float(v["kp"])
+    model.actuator_biasprm[:, 1] *= float(v["kp"])
+    model.actuator_biasprm[:, 2] *= float(v["kd"])
+    model.dof_frictionloss[:] *= float(v["joint_friction"])
+    model.dof_damping[:] *= float(v["joint_friction"])
     data: Any = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:], data.qacc_warmstart[:], data.ctrl[:] = v["qpos"], v["qvel"], v["warmstart"], target
-    while True:
+    data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = v["qpos"], v["qvel"], v["warmstart"]
+    for target in _targets(v):
+        data.ctrl[:] = target
+        model.actuator_forcerange[:] = torque_range(np, data.qvel[6:])
         mujoco.mj_step(model, data)
         yield data.qpos.copy(), data.qvel.copy(), data.qacc.copy(), data.actuator_force.copy()
 

@@ -10,9 +10,13 @@ from torch import Tensor
 from torch.nn import functional
 
 from vinl.loco.student_config import SightConfig
+from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import Camera
 from vinl.robot.rotation import matrix_of
 from vinl.sensing.depth import DepthCamera, Mesh
+
+_PAST = 3
+"""Poses that are kept, the newest first."""
 
 _DRAWS = 10
 """Uniform numbers in [-1, 1) that an episode's camera takes: position 3, angles 3, zoom, scale, holes, delay."""
@@ -43,8 +47,8 @@ class Sight:
         self._generator = torch.Generator(self._device)
         self._seed, self._count = seed, 0
         self._draws = self._draw_cameras(n)
-        self._pose = torch.zeros(n, 7, device=self._device)
-        self._before: Tensor | None = None
+        self._past = torch.zeros(_PAST, n, 7, device=self._device)
+        self._seen = False
 
     def look(self, pose: Float[Tensor, "n 7"], done: Shaped[Tensor, " n"] | None) -> Float[Tensor, "n height width"]:
         """What the robots see now.
@@ -59,23 +63,26 @@ class Sight:
         if done is not None:
             self._count += 1
             fresh = done.bool()[:, None]
-            self._before = torch.where(fresh, pose, self._pose)
+            past = torch.cat([pose[None], self._past[:-1]])
+            self._past = torch.where(fresh, pose, past)
             self._draws = torch.where(fresh, self._draw_cameras(len(pose)), self._draws)
-        self._pose = pose
-        before = pose if self._before is None else self._before
-        late = self._draws[:, 9:] < 2 * self.config.delay - 1
-        depth = self._render(torch.where(late, before, pose))
+        elif not self._seen:  # nobody has a past yet
+            self._past = pose.expand(_PAST, -1, -1).clone()
+        self._seen = True
+        low, high = self.config.delay
+        late = (low + (high - low) * (self._draws[:, 9] + 1) / 2) / CONTROL_DT
+        steps = late.round().long().clamp(0, _PAST - 1)
+        depth = self._render(self._past[steps, torch.arange(len(pose), device=self._device)])
         return self.camera.normalise(self._spoil(depth))
 
     def save_state(self) -> dict[str, Any]:
         """What ``load_state`` takes back."""
-        before = self._pose if self._before is None else self._before
-        return {"before": before.cpu(), "draws": self._draws.cpu(), "count": self._count}
+        return {"past": self._past.cpu(), "draws": self._draws.cpu(), "count": self._count}
 
     def load_state(self, state: dict[str, Any]) -> None:
         """See on as before."""
-        self._before, self._draws = state["before"].to(self._device), state["draws"].to(self._device)
-        self._count = state["count"]
+        self._past, self._draws = state["past"].to(self._device), state["draws"].to(self._device)
+        self._count, self._seen = state["count"], True
 
     def _seeded(self, purpose: int) -> torch.Generator:
         return self._generator.manual_seed(self._seed * 1_000_000_007 + 2 * self._count + purpose)

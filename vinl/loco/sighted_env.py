@@ -44,10 +44,8 @@ class SightedVecEnv(LocoVecEnv):
         with self._stopwatch.part("simulate"):
             return super()._simulate(actions)
 
-    def _pack(
-        self, noisy: torch.Tensor, exact: torch.Tensor, pose: torch.Tensor, done: torch.Tensor | None
-    ) -> TensorDict:
-        observation = super()._pack(noisy, exact, pose, done)
+    def _pack(self, seen: dict[str, torch.Tensor], done: torch.Tensor | None) -> TensorDict:
+        observation = super()._pack(seen, done)
         with self._stopwatch.part("render"):
-            observation["depth"] = self.sight.look(pose, done)
+            observation["depth"] = self.sight.look(seen["pose"], done)
         return observation

@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 from mujoco import mjx
 from scipy import ndimage
 
-from vinl.robot.aliengo import FOOT_GEOMS, FOOT_RADIUS, SHANK_SPHERES, SUBSTEPS, TRUNK_SPHERES
+from vinl.gait.ground_view import GroundMap, build_ground_map
+from vinl.loco.randomisation import Traits
+from vinl.robot.aliengo import (
+    FOOT_GEOMS,
+    FOOT_RADIUS,
+    JOINT_SPEED_LIMIT,
+    PHYSICS_DT,
+    SHANK_SPHERES,
+    SUBSTEPS,
+    TORQUE_LIMIT,
+    TRUNK_SPHERES,
+)
 from vinl.robot.aliengo import LEGS as LEG_NAMES
 from vinl.robot.model import robot_spec
 from vinl.world.blocks import Blocks
+from vinl.world.boxes import Boxes
 from vinl.world.clearance import FAR, block_distances, clearance
 from vinl.world.heightfield import BLOCK, WALL, HeightField
 
@@ -38,16 +50,39 @@ FOOT_REACH = FOOT_RADIUS + 0.02
 """A foot whose middle is farther than this from any block [m] does not touch one: what it touches then is the slope
 that the height field has for the block's side, up to a cell wide."""
 
+_BEHIND = (("FL", "RL"), ("FR", "RR"))
+_BESIDE = (("FL", "FR"), ("RL", "RR"))
+
+LEG_PAIRS = tuple(
+    (f"{a}_{low}", f"{b}_{high}")
+    for neighbours, parts in (
+        (_BEHIND, (("foot", "foot"), ("shank2", "foot"), ("foot", "shank2"), ("shank1", "foot"))),
+        (_BESIDE, (("foot", "foot"), ("shank2", "shank2"))),
+    )
+    for a, b in neighbours
+    for low, high in parts
+)
+"""Spheres of neighbouring legs that collide: a few of the many, where legs met in MuJoCo C."""
+
+FULL_TORQUE = 0.7
+"""Up to this fraction of its largest speed a joint has its whole torque; from there on what speeds it up falls evenly
+to nothing at the largest. The maker gives the two ends alone: this is an assumption."""
+
+PAST = 3
+"""Joint targets that a robot keeps, the newest first: an action may take effect up to two control steps late."""
+
 
 class Ground(NamedTuple):
-    """The height field on the device. It travels as an argument: as a constant it would be copied into the program.
+    """The ground on the device. It travels as an argument: as a constant it would be copied into the program.
 
     Attributes:
-        normalised: (rows * columns,) heights scaled to [0, 1] as MuJoCo stores them.
-        heights: (rows * columns,) heights [m].
+        normalised: (rows * columns,) heights that robots collide with, scaled to [0, 1] as MuJoCo stores them.
+        heights: (rows * columns,) heights that the scan reads [m].
         near: (rows * columns,) bit 1: a block lies near; bit 2: a wall lies near.
-        distance, top: (rows * columns,) distance from the nearest block and its height [m], for the shanks; one number
-            where the ground has no blocks.
+        distance, top: (rows * columns,) distance from the nearest block and its height [m]; one number where the ground
+            has no blocks.
+        map: what footholds are chosen on.
+        solid: whether the blocks collide.
     """
 
     normalised: Float[Array, " cells"]
@@ -55,6 +90,8 @@ class Ground(NamedTuple):
     near: Array
     distance: Float[Array, " cells"]
     top: Float[Array, " cells"]
+    map: GroundMap
+    solid: Bool[Array, ""]
 
 
 class Body(NamedTuple):
@@ -74,7 +111,9 @@ class Contacts(NamedTuple):
 
     Attributes:
         foot, shank: (n, 4) anything; trunk: (n,) anything; trunk_down: (n,) something from above.
-        foot_block, shank_block, foot_wall, shank_wall: (n, 4) a block, a wall.
+        foot_block, shank_block, foot_wall, shank_wall: (n, 4) a block, a wall. A block that is no obstacle yet counts
+            where a foot or a shank is in it.
+        crossing: (n,) one leg another.
     """
 
     foot: Bool[Array, "n 4"]
@@ -85,6 +124,13 @@ class Contacts(NamedTuple):
     shank_block: Bool[Array, "n 4"]
     foot_wall: Bool[Array, "n 4"]
     shank_wall: Bool[Array, "n 4"]
+    crossing: Bool[Array, " n"]
+
+    @classmethod
+    def none(cls) -> Contacts:
+        """Of one robot that touches nothing."""
+        legs, one = jnp.zeros(FEET, bool), jnp.zeros((), bool)
+        return cls(legs, legs, one, one, legs, legs, legs, legs, one)
 
 
 class Simulation:
@@ -95,14 +141,24 @@ class Simulation:
         kp, kd: joint gains [N m / rad, N m s / rad].
         blocks: those on the ground: the whole length of the shanks is held against them. The three spheres of a shank
             leave gaps through which the edge of a block slips.
+        walls: what else footholds must keep off.
+        leg_pairs: spheres of which each touches its partner.
 
     Attributes:
-        ground: the arrays that ``step`` needs.
+        ground: the arrays that ``step`` needs; ``set_solid`` changes whether its blocks collide.
         frame: where the cells of the ground lie.
         model: the MuJoCo model.
     """
 
-    def __init__(self, field: HeightField, kp: float, kd: float, blocks: Blocks | None = None) -> None:
+    def __init__(
+        self,
+        field: HeightField,
+        kp: float,
+        kd: float,
+        blocks: Blocks | None = None,
+        walls: Boxes | None = None,
+        leg_pairs: tuple[tuple[str, str], ...] = LEG_PAIRS,
+    ) -> None:
         self.frame = field.frame
         rows, columns = field.frame.shape
         low, span = float(field.heights.min()), max(float(np.ptp(field.heights)), 0.1)
@@ -119,6 +175,8 @@ class Simulation:
             conaffinity=0,
             condim=1,
         )
+        for a, b in leg_pairs:
+            spec.add_pair(geomname1=a, geomname2=b, condim=1)
         self.model = spec.compile()
         self.model.hfield_data[:] = normalised
         mx = mjx.put_model(self.model, impl="jax")
@@ -130,31 +188,46 @@ class Simulation:
         self._trunk = self.model.body("trunk").id
         self._calves = np.array([self.model.body(f"{leg}_calf").id for leg in LEG_NAMES])
         self._has_blocks = blocks is not None and len(blocks) > 0
+        boxes = blocks.boxes() if blocks is not None else Boxes.empty()
         distance, top = np.zeros((1, 1)), np.zeros((1, 1))
-        if blocks is not None and len(blocks) > 0:
-            distance, top = block_distances(field.frame, blocks.boxes())
+        if self._has_blocks:
+            distance, top = block_distances(field.frame, boxes)
         near = _near(field, BLOCK) + 2 * _near(field, WALL)
+        floor = np.where(field.labels == WALL, 0.0, field.heights).astype(np.float32)
+        ground_map = build_ground_map(floor, field.frame, boxes + (Boxes.empty() if walls is None else walls))
+        grids = (normalised, field.heights, near, distance, top)
         # committed arrays only: a mixture of committed and uncommitted ones compiles every program twice
-        self.ground = jax.device_put(
-            Ground(*(jnp.asarray(x.reshape(-1)) for x in (normalised, field.heights, near, distance, top))),
-            jax.devices()[0],
-        )
-        self._contact_rows = self._find_contact_rows()
-        self._substeps = jax.vmap(self._control_step, in_axes=(None, 0, 0, 0, 0, 0, 0))
+        ground = Ground(*(x.reshape(-1) for x in grids), map=ground_map, solid=np.ones((), bool))  # type: ignore[arg-type]
+        self.ground: Ground = jax.device_put(jax.tree.map(jnp.asarray, ground), jax.devices()[0])
+        bare = np.where(field.labels == BLOCK, 0.0, field.heights)  # blocks stand on level tiles
+        self._bare = ((bare - low) / span).astype(np.float32).reshape(-1)
+        self._solid = normalised
+        self._ground_rows, self._leg_rows = self._find_contact_rows()
+        self._substeps = jax.vmap(self._control_step, in_axes=(None, 0, 0, 0))
 
-    def _find_contact_rows(self) -> np.ndarray:
-        """(spheres, 4) which rows of MJX's contact arrays belong to which sphere: they never change."""
+    def set_solid(self, solid: bool) -> None:
+        """From the next step on blocks collide, or are only seen and judged; nothing is compiled anew."""
+        if solid == bool(self.ground.solid):
+            return
+        device = jax.devices()[0]
+        normalised = jax.device_put(jnp.asarray(self._solid if solid else self._bare), device)
+        flag = jax.device_put(jnp.asarray(np.array(solid)), device)
+        self.ground = self.ground._replace(normalised=normalised, solid=flag)
+
+    def _find_contact_rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """(spheres, 4) which rows of MJX's contact arrays hold which sphere against the ground, and (k,) which a leg
+        against another: they never change."""
 
         def forward(normalised: Array) -> Array:
             mx = self._mx.replace(hfield_data=normalised)
             return mjx.forward(mx, self._start)._impl.contact.geom
 
-        shape = jax.eval_shape(forward, self.ground.normalised)
         geom = np.asarray(jax.jit(forward)(self.ground.normalised))
-        rows = np.stack([np.flatnonzero((geom == sphere).any(1)) for sphere in self._spheres])
-        if rows.shape != (len(self._spheres), shape.shape[0] // len(self._spheres)):
-            raise RuntimeError(f"contact rows of the spheres have shape {rows.shape}")
-        return rows
+        on_ground = (geom == self.model.geom("ground").id).any(1)
+        rows = np.stack([np.flatnonzero((geom == sphere).any(1) & on_ground) for sphere in self._spheres])
+        if rows.size != on_ground.sum():
+            raise RuntimeError(f"contact rows of the spheres have shape {rows.shape}, {on_ground.sum()} are on ground")
+        return rows, np.flatnonzero(~on_ground)
 
     def cell(self, xy: Float[Array, "*n 2"]) -> Array:
         """Flat indices of the cells that hold the points, held to the field's edge."""
@@ -163,97 +236,127 @@ class Simulation:
         i = jnp.clip(jnp.round((xy[..., 1] - f.y0) / f.resolution), 0, f.shape[0] - 1).astype(jnp.int32)
         return i * f.shape[1] + j
 
-    def over_block(self, ground: Ground, xy: Float[Array, "*n 2"]) -> Bool[Array, "*n"]:
-        """Whether points [m] lie above a block, to half a cell."""
+    def block_distance(self, ground: Ground, xy: Float[Array, "*n 2"]) -> Float[Array, "*n"]:
+        """Distance of points [m] from the nearest block's footprint, to half a cell, at most ``FAR``; negative over
+        one."""
         if not self._has_blocks:
-            return jnp.zeros(xy.shape[:-1], bool)
-        return ground.distance[self.cell(xy)] < 0
+            return jnp.full(xy.shape[:-1], FAR)
+        return ground.distance[self.cell(xy)]
 
     def step(
-        self, ground: Ground, body: Body, target: Float[Array, "n 12"], friction: Array, added_mass: Array
+        self, ground: Ground, body: Body, targets: Float[Array, "n past 12"], delay: Int[Array, " n"], traits: Traits
     ) -> tuple[Body, Contacts, Float[Array, "n 12"]]:
         """One control step of all robots.
 
         Args:
             ground: ``self.ground``.
             body: state of the robots.
-            target: joint targets [rad].
-            friction: (n,) of the feet.
-            added_mass: (n,) on the trunk [kg].
+            targets: joint targets of this control step and of those before it, the newest first [rad].
+            delay: physics steps until a target takes effect, at most ``SUBSTEPS`` * (``PAST`` - 1).
+            traits: what the robots are like.
 
         Returns:
             The new state, the latched contacts and the torques of the last substep [N m].
         """
-        qpos, qvel, warm, flags, torque = self._substeps(ground, *body, target, friction, added_mass)
-        n = len(qpos)
-        touch, block, wall = (
-            flags[:, : LEGS + TRUNK],
-            flags[:, LEGS + TRUNK :][:, :LEGS],
-            flags[:, 2 * LEGS + TRUNK : 3 * LEGS + TRUNK],
-        )
+        return self._substeps(ground, body, (targets, delay), traits)
 
-        def by_leg(spheres: Array) -> Array:
-            return spheres[:, FEET:LEGS].reshape(n, FEET, SHANKS // FEET).any(2)
-
-        contacts = Contacts(
-            foot=touch[:, :FEET],
-            shank=by_leg(touch),
-            trunk=touch[:, LEGS:].any(1),
-            trunk_down=flags[:, -1],
-            foot_block=block[:, :FEET],
-            shank_block=by_leg(block) | flags[:, 3 * LEGS + TRUNK : -1],
-            foot_wall=wall[:, :FEET],
-            shank_wall=by_leg(wall),
-        )
-        return Body(qpos, qvel, warm), contacts, torque
-
-    def robot_model(self, ground: Ground, friction: Array, added_mass: Array) -> mjx.Model:
-        """The model of one robot: its ground, the friction of its feet, the mass added to its trunk [kg]."""
+    def robot_model(self, ground: Ground, traits: Traits) -> mjx.Model:
+        """The model of one robot on its ground; ``traits`` without their first axis."""
         mx = self._mx
+        gain = mx.actuator_gainprm.at[:, 0].multiply(traits.kp)
+        bias = mx.actuator_biasprm.at[:, 1].multiply(traits.kp).at[:, 2].multiply(traits.kd)
         return mx.replace(
             hfield_data=ground.normalised,
-            geom_friction=mx.geom_friction.at[self._feet, 0].set(friction),
-            body_mass=mx.body_mass.at[self._trunk].add(added_mass),
+            geom_friction=mx.geom_friction.at[self._feet, 0].set(traits.friction),
+            body_mass=mx.body_mass.at[self._trunk].add(traits.added_mass),
+            actuator_gainprm=gain,
+            actuator_biasprm=bias,
+            dof_frictionloss=mx.dof_frictionloss * traits.joint_friction,
+            dof_damping=mx.dof_damping * traits.joint_friction,
         )
 
-    def physics_step(self, model: mjx.Model, qpos: Array, qvel: Array, warm: Array, target: Array) -> mjx.Data:
-        """5 ms of one robot: (19,), (18,), (18,) of its state and (12,) joint targets [rad]."""
+    def physics_step(self, model: mjx.Model, body: Body, target: Float[Array, "12"]) -> mjx.Data:
+        """5 ms of one robot with joint targets [rad]."""
+        model = model.replace(actuator_forcerange=torque_range(jnp, body.qvel[6:]))
+        qpos, qvel, warm = body
         return mjx.step(model, self._start.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warm, ctrl=target))
 
-    def _control_step(self, ground, qpos, qvel, warm, target, friction, added_mass):
+    def _control_step(
+        self, ground: Ground, body: Body, told: tuple[Float[Array, "past 12"], Int[Array, ""]], traits: Traits
+    ) -> tuple[Body, Contacts, Float[Array, "12"]]:
         """The substeps of one robot."""
-        model = self.robot_model(ground, friction, added_mass)
+        model = self.robot_model(ground, traits)
+        targets, delay = told
 
-        def substep(carry, _):
-            qpos, qvel, warm, flags, _ = carry
-            data = self.physics_step(model, qpos, qvel, warm, target)
-            contact = data._impl.contact
-            on = contact.dist[self._contact_rows] < 0
-            up, z = contact.frame[:, 0, 2][self._contact_rows], contact.pos[:, 2][self._contact_rows]
-            # blocks and walls stand on level ground at z = 0: what is higher or leans is not that ground
-            raised = jnp.any(on[:LEGS] & ((up[:LEGS] < 0.7) | (z[:LEGS] > 0.02)), 1)
-            near = ground.near[self.cell(data.geom_xpos[self._spheres[:LEGS], :2])]
-            block, wall = raised & ((near & 1) > 0), raised & (near == 2)
+        def substep(carry, k):
+            body, contacts, _ = carry
+            data = self.physics_step(model, body, targets[target_age(k, delay)])
+            contacts = jax.tree.map(jnp.logical_or, contacts, self._touching(ground, data))
+            return (Body(data.qpos, data.qvel, data.qacc_warmstart), contacts, data.actuator_force), None
+
+        start = body, Contacts.none(), jnp.zeros(12)
+        return jax.lax.scan(substep, start, jnp.arange(SUBSTEPS))[0]
+
+    def _touching(self, ground: Ground, data: mjx.Data) -> Contacts:
+        """The contacts of one robot after a physics step."""
+        contact = data._impl.contact
+        on = contact.dist[self._ground_rows] < 0
+        up, z = contact.frame[:, 0, 2][self._ground_rows], contact.pos[:, 2][self._ground_rows]
+        # blocks and walls stand on level ground at z = 0: what is higher or leans is not that ground
+        raised = jnp.any(on[:LEGS] & ((up[:LEGS] < 0.7) | (z[:LEGS] > 0.02)), 1)
+        near = ground.near[self.cell(data.geom_xpos[self._spheres[:LEGS], :2])]
+        block, wall, touch = raised & ((near & 1) > 0), raised & (near == 2), jnp.any(on, 1)
+        foot_block, shank_block = block[:FEET], _by_leg(block[FEET:])
+        if self._has_blocks:
             free, beside = self._at_blocks(ground, data)
-            if self._has_blocks:
-                block = jnp.concatenate([block[:FEET] & (free < FOOT_REACH), block[FEET:]])
-            down = jnp.any(on[LEGS:] & (up[LEGS:] > 0.5))
-            new = jnp.concatenate([jnp.any(on, 1), block, wall, beside, down[None]])
-            return (data.qpos, data.qvel, data.qacc_warmstart, flags | new, data.actuator_force), None
-
-        flags = jnp.zeros(3 * LEGS + TRUNK + FEET + 1, bool)
-        start = (qpos, qvel, warm, flags, jnp.zeros(12))
-        return jax.lax.scan(substep, start, None, length=SUBSTEPS)[0]
+            foot_block = (foot_block & (free < FOOT_REACH)) | (free < FOOT_RADIUS)
+            shank_block = shank_block | beside
+        return Contacts(
+            foot=touch[:FEET],
+            shank=_by_leg(touch[FEET:LEGS]),
+            trunk=jnp.any(touch[LEGS:]),
+            trunk_down=jnp.any(on[LEGS:] & (up[LEGS:] > 0.5)),
+            foot_block=foot_block,
+            shank_block=shank_block,
+            foot_wall=wall[:FEET],
+            shank_wall=_by_leg(wall[FEET:]),
+            crossing=jnp.any(contact.dist[self._leg_rows] < 0),
+        )
 
     def _at_blocks(self, ground: Ground, data: mjx.Data) -> tuple[Float[Array, "4"], Bool[Array, "4"]]:
         """By geometry: how far the middles of one robot's feet are from the blocks [m], and which of its shanks touch
         one, anywhere along their length."""
-        if not self._has_blocks:
-            return jnp.full(FEET, FAR), jnp.zeros(FEET, bool)
         line = data.xpos[self._calves, None] + jnp.einsum("lij,kj->lki", data.xmat[self._calves], SHANK_LINE)
         points = jnp.concatenate([data.geom_xpos[self._feet][:, None], line], 1)
         free = clearance(jnp, ground.distance, ground.top, self.frame, points)
         return free[:, 0], jnp.any(free[:, 1:] < SHANK_REACH, 1)
+
+
+def target_age(substep: Array, delay: Array) -> Array:
+    """How many control steps old the joint target is that acts in a physics step.
+
+    Args:
+        substep: of the control step.
+        delay: physics steps until a target takes effect.
+    """
+    return jnp.clip((delay - substep + SUBSTEPS - 1) // SUBSTEPS, 0, PAST - 1)
+
+
+def delay_steps(latency: Float[Array, " n"]) -> Int[Array, " n"]:
+    """Latencies [s] in physics steps, to the nearest."""
+    return jnp.round(latency / PHYSICS_DT).astype(jnp.int32)
+
+
+def torque_range(xp: Any, speed: Any) -> Any:
+    """(12, 2) least and largest torque of the joints at speeds (12,) [N m, rad/s]: what speeds a joint up fades beyond
+    ``FULL_TORQUE`` of its largest speed, what brakes it does not. For numpy and jax.numpy."""
+    left = xp.clip((1 - xp.abs(speed) / JOINT_SPEED_LIMIT) / (1 - FULL_TORQUE), 0.0, 1.0)
+    faster = TORQUE_LIMIT * left
+    return xp.stack([xp.where(speed < 0, -faster, -TORQUE_LIMIT), xp.where(speed > 0, faster, TORQUE_LIMIT)], -1)
+
+
+def _by_leg(spheres: Bool[Array, " shanks"]) -> Bool[Array, "4"]:
+    return spheres.reshape(FEET, SHANKS // FEET).any(1)
 
 
 def _near(field: HeightField, label: int) -> np.ndarray:

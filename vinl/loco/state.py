@@ -8,10 +8,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from vinl.loco.commands import DRAWS, between, draw_commands
+from vinl.loco.commands import draw_commands
 from vinl.loco.config import LocoConfig, RandomisationConfig
 from vinl.loco.measures import MEASURES, TERMS
-from vinl.loco.simulation import Body
+from vinl.loco.randomisation import Traits, draw_traits, split_by_name, uniform
+from vinl.loco.simulation import PAST, Body
+from vinl.loco.walking import Walk, start_walk
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
 
 
@@ -22,36 +24,81 @@ class State(NamedTuple):
         key: random state.
         body: physics.
         action: (n, 12) last one.
+        targets: (n, past, 12) joint targets, the newest first [rad].
+        walk: gait and foothold plan.
         command: (n, 3); command_left: (n,) steps until the next.
         push_left: (n,) steps until the next push.
         step: (n,) of the episode, from a random one at first; life: (n,) steps since the start, -1 where the
             observation is not finite.
-        air_time: (n, 4) [s]; touched: (n, 4) feet on the ground in the last step.
+        touched: (n, 4) feet on the ground in the last step; flying: (n, 4) feet that have not touched since.
+        touching: (n, 16) feet and shanks on anything, feet and shanks on blocks in the last step, for the critic.
+        velocity_error: (n, 3) of the observed base velocity [m/s].
         way, commanded: (n,) progress along the commands and what they asked for [m].
         hits: (n,) steps of the episode with a foot or shank on a block.
         level, column: (n,) tile.
-        friction, added_mass: (n,) of the robot.
+        traits: of the robots.
         sums: (m,) of ``MEASURES`` and of the reward terms since they were last read.
     """
 
     key: Array
     body: Body
     action: Float[Array, "n 12"]
+    targets: Float[Array, "n past 12"]
+    walk: Walk
     command: Float[Array, "n 3"]
     command_left: Int[Array, " n"]
     push_left: Int[Array, " n"]
     step: Int[Array, " n"]
     life: Int[Array, " n"]
-    air_time: Float[Array, "n 4"]
     touched: Bool[Array, "n 4"]
+    flying: Bool[Array, "n 4"]
+    touching: Bool[Array, "n 16"]
+    velocity_error: Float[Array, "n 3"]
     way: Float[Array, " n"]
     commanded: Float[Array, " n"]
     hits: Float[Array, " n"]
     level: Int[Array, " n"]
     column: Int[Array, " n"]
-    friction: Float[Array, " n"]
-    added_mass: Float[Array, " n"]
+    traits: Traits
     sums: Float[Array, " m"]
+
+
+class StartKeys(NamedTuple):
+    """Random states that starts are drawn from."""
+
+    place: Array
+    yaw: Array
+    joints: Array
+    velocity: Array
+
+
+class EpisodeKeys(NamedTuple):
+    """Random states that an episode begins with."""
+
+    body: Array
+    traits: Array
+    velocity_error: Array
+
+
+class FirstKeys(NamedTuple):
+    """Random states that a training begins with."""
+
+    state: Array
+    episode: Array
+    command: Array
+    level: Array
+    push: Array
+    step: Array
+
+
+class Episode(NamedTuple):
+    """What begins with an episode: fields of ``State``."""
+
+    body: Body
+    targets: Float[Array, "n past 12"]
+    walk: Walk
+    velocity_error: Float[Array, "n 3"]
+    traits: Traits
 
 
 def count_steps(config: LocoConfig) -> int:
@@ -64,7 +111,7 @@ def start_body(
     starts: Float[Array, "levels columns 3"],
     level: Int[Array, " n"],
     column: Int[Array, " n"],
-    u: Float[Array, "n 22"],
+    key: Array,
 ) -> Body:
     """Robots near the middle of their tiles, any heading, joints and velocities a little off.
 
@@ -72,21 +119,44 @@ def start_body(
         randomisation: how far off.
         starts: middles of the tiles and the ground's height there [m].
         level, column: tile of each robot.
-        u: random numbers in [0, 1).
+        key: random state.
     """
-    c, n, s = randomisation, len(u), 2 * u - 1
-    middle, yaw, zero = starts[level, column], s[:, 2] * jnp.pi, jnp.zeros(n)
+    c, n, keys = randomisation, len(level), split_by_name(StartKeys, key)
+    middle, yaw, zero = starts[level, column], uniform(keys.yaw, (n,), (-jnp.pi, jnp.pi)), jnp.zeros(n)
     qpos = jnp.concatenate(
         [
-            middle[:, :2] + s[:, :2] * c.start_xy,
+            middle[:, :2] + uniform(keys.place, (n, 2), (-c.start_xy, c.start_xy)),
             middle[:, 2:] + c.start_height,
             jnp.stack([jnp.cos(yaw / 2), zero, zero, jnp.sin(yaw / 2)], 1),
-            jnp.asarray(DEFAULT_POSE, jnp.float32) * (1 + c.start_joints * s[:, 3:15]),
+            jnp.asarray(DEFAULT_POSE, jnp.float32) * uniform(keys.joints, (n, 12), _about(1.0, c.start_joints)),
         ],
         1,
     )
-    qvel = jnp.concatenate([c.start_velocity * s[:, 15:21], jnp.zeros((n, 12))], 1)
-    return Body(qpos, qvel, jnp.zeros((n, 18)))
+    velocity = uniform(keys.velocity, (n, 6), _about(0.0, c.start_velocity))
+    return Body(qpos, jnp.concatenate([velocity, jnp.zeros((n, 12))], 1), jnp.zeros((n, 18)))
+
+
+def _about(middle: float, spread: float) -> tuple[float, float]:
+    return middle - spread, middle + spread
+
+
+def begin_episode(
+    config: LocoConfig,
+    starts: Float[Array, "levels columns 3"],
+    level: Int[Array, " n"],
+    column: Int[Array, " n"],
+    key: Array,
+) -> Episode:
+    """All robots at a start; arguments as for ``start_body``."""
+    c, n, keys = config.randomisation, len(level), split_by_name(EpisodeKeys, key)
+    body = start_body(c, starts, level, column, keys.body)
+    return Episode(
+        body=body,
+        targets=jnp.tile(jnp.asarray(DEFAULT_POSE, jnp.float32), (n, PAST, 1)),
+        walk=start_walk(config.gait, body),
+        velocity_error=c.velocity_bias * jax.random.normal(keys.velocity_error, (n, 3)),
+        traits=draw_traits(c, keys.traits, n),
+    )
 
 
 def first_state(config: LocoConfig, starts: Float[Array, "levels columns 3"], key: Array) -> State:
@@ -97,31 +167,33 @@ def first_state(config: LocoConfig, starts: Float[Array, "levels columns 3"], ke
         starts: as for ``start_body``.
         key: random state.
     """
-    c, n = config, config.num_envs
-    key, draw = jax.random.split(key)
-    u = jax.random.uniform(draw, (n, 40))
+    c, n, keys = config, config.num_envs, split_by_name(FirstKeys, key)
     highest = min(c.curriculum.first_level, c.terrain.levels - 1)
-    level = (u[:, 30] * (highest + 1)).astype(jnp.int32)
+    level = jax.random.randint(keys.level, (n,), 0, highest + 1)
     column = (jnp.arange(n) % c.terrain.columns).astype(jnp.int32)
-    command, left = draw_commands(c.commands, u[:, 22 : 22 + DRAWS])
+    command, left = draw_commands(c.commands, keys.command, n)
+    start = begin_episode(c, starts, level, column, keys.episode)
     state = State(
-        key=key,
-        body=start_body(c.randomisation, starts, level, column, u[:, :22]),
+        key=keys.state,
+        body=start.body,
         action=jnp.zeros((n, 12)),
+        targets=start.targets,
+        walk=start.walk,
         command=command,
         command_left=left,
-        push_left=(u[:, 31] * c.randomisation.push_interval / CONTROL_DT).astype(jnp.int32),
-        step=(u[:, 32] * count_steps(c)).astype(jnp.int32),
+        push_left=(uniform(keys.push, (n,), (0.0, c.randomisation.push_interval)) / CONTROL_DT).astype(jnp.int32),
+        step=jax.random.randint(keys.step, (n,), 0, count_steps(c)),
         life=jnp.zeros(n, jnp.int32),
-        air_time=jnp.zeros((n, 4)),
         touched=jnp.zeros((n, 4), bool),
+        flying=jnp.zeros((n, 4), bool),
+        touching=jnp.zeros((n, 16), bool),
+        velocity_error=start.velocity_error,
         way=jnp.zeros(n),
         commanded=jnp.zeros(n),
         hits=jnp.zeros(n),
         level=level,
         column=column,
-        friction=between(c.randomisation.friction, u[:, 33]),
-        added_mass=between(c.randomisation.added_mass, u[:, 34]),
+        traits=start.traits,
         sums=jnp.zeros(len(MEASURES) + len(TERMS)),
     )
     return strip_weak_types(state)

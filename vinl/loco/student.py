@@ -1,4 +1,4 @@
-"""Stage 3: a student with a camera learns from a teacher with a height scan, in the same MJX environment."""
+"""Stage 3: a student with a camera learns what its teacher knows of the ground, in the same MJX environment."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import torch
 
 from vinl.config.errors import InputError
 from vinl.config.loader import dump_config
+from vinl.gait.config import GaitConfig
+from vinl.gait.observation import SENSED_TABLE
 from vinl.loco.config import LocoConfig
 from vinl.loco.distillation import Distillation
 from vinl.loco.environment import LocoEnvironment
@@ -19,9 +21,9 @@ from vinl.loco.student_config import StudentConfig
 from vinl.loco.warm_start import load_teacher
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.commit import find_commit
-from vinl.policies.depth_actor import DepthActor
 from vinl.policies.io import save_policy
-from vinl.policies.networks import MapActor
+from vinl.policies.networks import StepActor
+from vinl.policies.stepping_actor import SteppingActor
 from vinl.rl.loop import TrainingLoop
 from vinl.rl.run_folder import RunFolder
 from vinl.rl.stopwatch import Stopwatch
@@ -38,16 +40,16 @@ def describe_student_figures(row: dict[str, float]) -> dict[str, str]:
     return {
         "samples/s": f"{row['samples_per_second']:,.0f}",
         "code": f"{row['loss/unexplained']:.1%} unexplained",
-        "action": f"{row['loss/action']:.4f}",
+        "velocity": f"{row['loss/velocity_rmse']:.3f} m/s",
         "feet/m": f"{row['foot_block_per_m']:.2f}",
         "falls/min": f"{row['falls_per_minute']:.2f}",
     }
 
 
-def build_student(config: StudentConfig, teacher: MapActor) -> DepthActor:
-    """A fresh student in front of a teacher's actor."""
-    net, camera, sizes = config.network, config.camera, teacher.arguments
-    student = DepthActor(
+def build_student(config: StudentConfig, teacher: StepActor, gait: GaitConfig) -> SteppingActor:
+    """A fresh student in front of a teacher's actor and planner."""
+    net, camera = config.network, config.camera
+    student = SteppingActor(
         vision=net.vision,
         height=camera.height,
         width=camera.width,
@@ -56,10 +58,10 @@ def build_student(config: StudentConfig, teacher: MapActor) -> DepthActor:
         layers=net.layers,
         memory=net.memory,
         planes=net.planes,
-        proprioception=sizes["proprioception"],
-        code=sizes["code"],
-        actor=sizes["actor"],
-        actions=sizes["actions"],
+        code=net.code,
+        actor=teacher.arguments["actor"],
+        actions=teacher.arguments["actions"],
+        gait=asdict(gait),
     )
     if net.remember:
         student.memory.spread_memory(net.remember)
@@ -101,22 +103,23 @@ def train_student(
     torch.manual_seed(config.seed)
     torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
     stopwatch = Stopwatch(device)
-    student = build_student(settings, teacher)
+    student = build_student(settings, teacher, config.gait)
     environment = LocoEnvironment(config)
     camera = settings.camera.record()
     mesh = terrain_mesh(environment.terrain)
     sight = Sight(mesh, camera, settings.sight, config.num_envs, device, config.seed)
     env = SightedVecEnv(environment, sight, device, stopwatch)
     algorithm = Distillation(student, teacher, settings.distillation, config.num_envs, device, stopwatch)
+    env.followed = algorithm.gait
     commit = find_commit()
 
-    def export(policy: DepthActor, samples: int) -> None:
+    def export(policy: SteppingActor, samples: int) -> None:
         action = {**describe_action(), "kp": config.kp, "kd": config.kd}
         card = locomotion_card(
             name or run.path.name,
             policy.describe(),
             action,
-            scan=False,
+            table=SENSED_TABLE,
             camera=camera.describe() if policy.image else None,
             training={**dump_config(config), "origin": described},
             seed=config.seed,
@@ -142,4 +145,4 @@ def train_student(
 
 def _teacher_card(name: str, config: LocoConfig, network: dict[str, Any], samples: int, commit: str) -> PolicyCard:
     action = {**describe_action(), "kp": config.kp, "kd": config.kd}
-    return locomotion_card(name, network, action, samples=samples, commit=commit)
+    return locomotion_card(name, network, action, False, asdict(config.gait), samples=samples, commit=commit)

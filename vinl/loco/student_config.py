@@ -7,10 +7,13 @@ from dataclasses import dataclass, field, replace
 
 from vinl.config.errors import InputError
 from vinl.policies.depth_memory import MEMORIES, VISIONS
+from vinl.policies.stepping_actor import CODES
 from vinl.robot.cameras import LOCOMOTION_CAMERA, Camera
 
-LOSSES = ("code", "action", "both")
 HOLES = ("far", "zero")
+
+MAX_DELAY = 0.04
+"""An image comes at most this late [s]: two control steps."""
 
 
 def _check_share(name: str, value: float) -> None:
@@ -20,7 +23,7 @@ def _check_share(name: str, value: float) -> None:
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """The student's network; the actor behind it is the teacher's [paper III-C].
+    """The student's network; planner and actor behind it are the teacher's [paper III-C].
 
     Attributes:
         vision: ``cnn``, ``resnet18`` or ``none`` (blind, but with memory).
@@ -30,6 +33,8 @@ class NetworkConfig:
         planes: channels of the first stage of ``resnet18``.
         remember: at the start the LSTM's cells keep what they hold for 1 to this many control steps, spread evenly;
             0: the paper's start, which forgets within two steps.
+        code: what is predicted of the ground: ``plan`` (the foothold plan) or ``map`` (heights about the robot, which
+            the planner reads).
     """
 
     vision: str = "cnn"
@@ -39,6 +44,7 @@ class NetworkConfig:
     memory: str = "lstm"
     planes: int = 32
     remember: int = 50
+    code: str = "map"
 
     def __post_init__(self) -> None:
         if self.vision not in VISIONS:
@@ -47,6 +53,8 @@ class NetworkConfig:
             raise InputError(f"student.network.memory must be one of {', '.join(MEMORIES)}, got {self.memory!r}")
         if min(self.visual, self.hidden, self.layers, self.planes) < 1 or self.planes % 16:
             raise InputError("student.network: sizes must be at least 1, planes a multiple of 16")
+        if self.code not in CODES:
+            raise InputError(f"student.network.code must be one of {', '.join(CODES)}, got {self.code!r}")
         if self.remember < 0 or self.remember == 1:
             raise InputError(f"student.network.remember must be 0 or at least 2, got {self.remember}")
 
@@ -96,7 +104,8 @@ class SightConfig:
         holes: largest share of the image that is missing; each episode draws its own up to this.
         hole_size: side of the squares that are missing [pixels].
         hole_reads: what a missing pixel reads: ``far`` or ``zero``.
-        delay: share of the episodes in which every image comes one control step late.
+        delay: range of the time by which every image of an episode is late [s], up to 0.04; in control steps, to the
+            nearest.
     """
 
     position: float = 0.01
@@ -107,13 +116,15 @@ class SightConfig:
     holes: float = 0.04
     hole_size: int = 4
     hole_reads: str = "far"
-    delay: float = 0.3
+    delay: tuple[float, float] = (0.0, 0.04)
 
     def __post_init__(self) -> None:
         if min(self.position, self.angle, self.noise) < 0:
             raise InputError("student.sight: position, angle and noise must not be negative")
-        for name in ("zoom", "scale", "holes", "delay"):
+        for name in ("zoom", "scale", "holes"):
             _check_share(f"student.sight.{name}", getattr(self, name))
+        if not 0 <= self.delay[0] <= self.delay[1] <= MAX_DELAY:
+            raise InputError(f"student.sight.delay must lie between 0 and {MAX_DELAY} s, got {list(self.delay)}")
         if self.hole_size < 1:
             raise InputError(f"student.sight.hole_size must be at least 1, got {self.hole_size}")
         if self.hole_reads not in HOLES:
@@ -122,20 +133,18 @@ class SightConfig:
 
 @dataclass(frozen=True)
 class DistillationConfig:
-    """DAgger: the student drives, the teacher says what it would have done [paper III-C].
+    """DAgger: the student walks by what it predicts, and is told what was true [paper III-C].
 
     Attributes:
         steps: control steps of each robot between updates.
         bptt: control steps that gradients flow back through; divides ``steps``. 1 is the paper's.
         epochs, minibatches: passes over a roll-out and parts of each; a part holds all steps of some robots.
-        loss: ``code`` (the paper's: the 32 numbers), ``action`` or ``both``.
-        code_weight, action_weight: of the two losses.
+        velocity_weight, code_weight: of the errors of the velocity and of the code.
         learning_rate, last_learning_rate: of Adam, at the start and at the end; a cosine between them.
         warmup: share of the iterations in which the rate rises from zero.
         max_grad_norm: gradients are clipped to this norm.
-        teacher_share: share of the robots that the teacher drives at the start; 0 is the paper's.
-        teacher_until: share of the iterations after which it drives none.
-        exploration: standard deviation of noise on the student's actions [1, times 0.25 rad].
+        teacher_share: fraction of the robots that walk by what is true at the start; 0 is the paper's.
+        teacher_until: fraction of the iterations after which none does.
         bfloat16: the convolutions in bfloat16 on a GPU.
     """
 
@@ -143,16 +152,14 @@ class DistillationConfig:
     bptt: int = 24
     epochs: int = 2
     minibatches: int = 8
-    loss: str = "both"
+    velocity_weight: float = 1.0
     code_weight: float = 1.0
-    action_weight: float = 1.0
     learning_rate: float = 1e-3
     last_learning_rate: float = 3e-5
     warmup: float = 0.01
     max_grad_norm: float = 1.0
     teacher_share: float = 1.0
     teacher_until: float = 0.04
-    exploration: float = 0.0
     bfloat16: bool = True
 
     def __post_init__(self) -> None:
@@ -160,12 +167,10 @@ class DistillationConfig:
             raise InputError("student.distillation: steps, bptt, epochs and minibatches must be at least 1")
         if self.steps % self.bptt:
             raise InputError(f"student.distillation.bptt must divide steps {self.steps}, got {self.bptt}")
-        if self.loss not in LOSSES:
-            raise InputError(f"student.distillation.loss must be one of {', '.join(LOSSES)}, got {self.loss!r}")
         if not 0 < self.last_learning_rate <= self.learning_rate or self.max_grad_norm <= 0:
             raise InputError("student.distillation: need 0 < last_learning_rate <= learning_rate and max_grad_norm > 0")
-        if min(self.exploration, self.code_weight, self.action_weight) < 0:
-            raise InputError("student.distillation: exploration and the weights must not be negative")
+        if min(self.velocity_weight, self.code_weight) < 0:
+            raise InputError("student.distillation: the weights must not be negative")
         for name in ("teacher_share", "teacher_until", "warmup"):
             _check_share(f"student.distillation.{name}", getattr(self, name))
 

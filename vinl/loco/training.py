@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import torch
 
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config, dump_config
+from vinl.gait.observation import STEPPING_TABLE
 from vinl.loco.config import LocoConfig, PpoConfig
 from vinl.loco.environment import LocoEnvironment
 from vinl.loco.vec_env import LocoVecEnv
@@ -17,7 +19,7 @@ from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.commit import find_commit
 from vinl.policies.io import save_policy
-from vinl.rl.models import BlindModel, MapModel, training_names
+from vinl.rl.models import MapModel, StepModel, training_names
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
 from vinl.rl.runner import TrainingRunner
 
@@ -28,9 +30,10 @@ WARMUP_RATE = 1e-3
 def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
     """Our PPO settings under rsl-rl's names."""
     p = config.ppo
-    sight: dict[str, Any] = {"class_name": "vinl.rl.models:BlindModel"}
-    if p.map:
+    sight: dict[str, Any] = {"class_name": "vinl.rl.models:StepModel"}
+    if p.scan:
         sight = {"class_name": "vinl.rl.models:MapModel", "encoder": list(p.encoder), "code": p.code}
+    sight["proprioception"] = STEPPING_TABLE.size
     update: dict[str, Any] = {"class_name": "PPO"}
     if p.update != "rsl_rl":
         update = {"class_name": "vinl.rl.fast_ppo:FastPPO", "graphs": p.update == "graphs"}
@@ -130,7 +133,7 @@ def train_locomotor(
     env = LocoVecEnv(environment, device)
     commit = find_commit()
 
-    def export(model: MapModel | BlindModel, samples: int) -> None:
+    def export(model: MapModel | StepModel, samples: int) -> None:
         actor = model.export()
         card = make_card(name or run.path.name, config, actor.describe(), samples, commit, origin)
         save_policy(run.policy, actor, card)
@@ -138,6 +141,8 @@ def train_locomotor(
     def schedule(algorithm: Any, share: float) -> None:
         teach_critic_first(algorithm, runner.current_learning_iteration, config.ppo)
         environment.set_rewards(config.anneal.rewards_at(share, config.rewards))
+        environment.set_noise(config.randomisation.noise_at(share))
+        environment.simulation.set_solid(share >= config.terrain.ghost)
         if config.anneal.entropy is not None:
             algorithm.entropy_coef = config.anneal.blend(share, config.ppo.entropy, config.anneal.entropy)
 
@@ -174,4 +179,4 @@ def make_card(
     action = {**describe_action(), "kp": config.kp, "kd": config.kd}
     training = {**dump_config(config), **({"origin": origin} if origin else {})}
     learned = {"seed": config.seed, "samples": samples, "commit": commit}
-    return locomotion_card(name, network, action, training=training, **learned)
+    return locomotion_card(name, network, action, config.ppo.scan, asdict(config.gait), training=training, **learned)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -11,7 +12,9 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from vinl.loco.environment import LocoEnvironment, StepResult
+from vinl.gait.state import GaitState
+from vinl.loco.environment import LocoEnvironment, Observations, StepResult
+from vinl.loco.state import State
 
 _LENT = 8
 """How many steps lent arrays are kept alive: the two libraries run on streams of their own, and neither may reuse
@@ -19,11 +22,16 @@ memory that the other still reads."""
 
 
 class LocoVecEnv(VecEnv):
-    """Observation groups: ``policy`` (with noise) and ``critic`` (exact), both (n, 235).
+    """Observation groups: ``policy`` (with noise, in the order of ``gait.observation.STEPPING_MAP_TABLE``), ``critic``
+    (the same exactly, then what only the critic knows), and what a student learns to predict: ``plan``, ``heights``
+    and ``velocity``, see ``environment.Observations``.
 
     Args:
         environment: the robots.
         device: torch device; JAX must run on the same kind.
+
+    Attributes:
+        followed: gives the gaits that robots follow, in torch, in place of the environment's own.
     """
 
     def __init__(self, environment: LocoEnvironment, device: str) -> None:
@@ -35,25 +43,28 @@ class LocoVecEnv(VecEnv):
         self._on_gpu = device.startswith("cuda")
         self._actions = [torch.zeros(self.num_envs, 12, device=device) for _ in range(_LENT)]
         self._results: deque[StepResult] = deque(maxlen=_LENT)
+        self._lent: deque[torch.Tensor] = deque(maxlen=_LENT * len(GaitState._fields))
         self._count = 0
+        self.followed: Callable[[], GaitState] | None = None
 
     def get_observations(self) -> TensorDict:
         """Of the present state."""
-        noisy, exact = (self._to_torch(x).clone() for x in self.environment.observe())
-        return self._pack(noisy, exact, self._to_torch(self.environment.trunk_pose()).clone(), None)
+        return self._pack({name: x.clone() for name, x in self._in_torch(self.environment.observe()).items()}, None)
 
     def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
         """Actions (n, 12) to observations, rewards (n,), dones (n,) and ``time_outs`` (n,)."""
-        noisy, exact, reward, done, timeout, pose = (self._to_torch(x) for x in self._simulate(actions))
-        return self._pack(noisy, exact, pose, done), reward, done, {"time_outs": timeout.float()}
+        seen, *ends = self._simulate(actions)
+        reward, done, timeout = (self._to_torch(x) for x in ends)
+        return self._pack(self._in_torch(seen), done), reward, done, {"time_outs": timeout.float()}
 
     def _simulate(self, actions: torch.Tensor) -> StepResult:
+        gait = None if self.followed is None else GaitState(*(self._to_jax(x) for x in self.followed()))
         if not self._on_gpu:
-            return self.environment.step(jax.numpy.asarray(actions.numpy()))
+            return self.environment.step(self._to_jax(actions), gait)
         lent = self._actions[self._count % _LENT]
         self._count += 1
         lent.copy_(actions)
-        result = self.environment.step(jax.dlpack.from_dlpack(lent))
+        result = self.environment.step(jax.dlpack.from_dlpack(lent), gait)
         self._results.append(result)
         return result
 
@@ -66,32 +77,54 @@ class LocoVecEnv(VecEnv):
         return self.environment.take_lost()
 
     def save_state(self) -> dict[str, Any]:
-        """The whole state of all robots, levels and random numbers included."""
-        leaves = [np.asarray(x) for x in jax.tree.leaves(self.environment.state)]
-        # torch lacks most operations on unsigned 32-bit numbers
-        return {"leaves": [torch.from_numpy(x.astype(np.int64) if x.dtype == np.uint32 else x.copy()) for x in leaves]}
+        """The whole state of all robots, levels and random numbers included: arrays by the names of their fields."""
+        return {name: _saved(np.asarray(x)) for name, x in _by_name(self.environment.state).items()}
 
     def load_state(self, state: dict[str, Any]) -> None:
         """Go on from a saved state.
 
         Raises:
-            ValueError: the state is of another number of robots.
+            ValueError: the state is of another number of robots, or of another version.
         """
-        leaves, shape = jax.tree.flatten(self.environment.state)
-        saved = [x.numpy().astype(leaf.dtype) for x, leaf in zip(state["leaves"], leaves, strict=True)]
-        if (
-            saved[-1].shape != leaves[-1].shape
-        ):  # sums since they were last read: a version with other measures wrote it
-            saved[-1] = np.zeros(leaves[-1].shape, leaves[-1].dtype)
-        if [x.shape for x in saved] != [leaf.shape for leaf in leaves]:
-            raise ValueError(f"it holds {len(saved[1])} robots, this run has {self.num_envs}")
-        self.environment.state = jax.device_put(jax.tree.unflatten(shape, saved), jax.devices()[0])
+        present = _by_name(self.environment.state)
+        lacking = sorted(present.keys() - state.keys())
+        if lacking:
+            raise ValueError(f"it holds no {', '.join(lacking)}: another version wrote it")
+        saved = {name: state[name].numpy().astype(x.dtype) for name, x in present.items()}
+        if saved["sums"].shape != present["sums"].shape:  # since they were last read, of other measures
+            saved["sums"] = np.zeros(present["sums"].shape, np.float32)
+        if any(saved[name].shape != x.shape for name, x in present.items()):
+            raise ValueError(f"it holds {len(saved['step'])} robots, this run has {self.num_envs}")
+        leaves = [saved[name] for name in present]
+        shape = jax.tree.structure(self.environment.state)
+        self.environment.state = jax.device_put(jax.tree.unflatten(shape, leaves), jax.devices()[0])
 
-    def _pack(
-        self, noisy: torch.Tensor, exact: torch.Tensor, pose: torch.Tensor, done: torch.Tensor | None
-    ) -> TensorDict:
-        """``pose`` (n, 7) of the trunks; ``done`` (n,) where an episode has just begun, None: no step was made."""
-        return TensorDict({"policy": noisy, "critic": exact}, batch_size=[self.num_envs])
+    def _pack(self, seen: dict[str, torch.Tensor], done: torch.Tensor | None) -> TensorDict:
+        """``seen``: the fields of ``Observations``; ``done`` (n,) where an episode has just begun, None: no step was
+        made."""
+        groups = {"policy": seen["noisy"], "critic": torch.cat([seen["exact"], seen["privileged"]], 1)}
+        groups |= {name: seen[name] for name in ("plan", "heights", "velocity")}
+        return TensorDict(groups, batch_size=[self.num_envs])  # type: ignore[arg-type]
+
+    def _in_torch(self, seen: Observations) -> dict[str, torch.Tensor]:
+        return {name: self._to_torch(x) for name, x in seen._asdict().items()}
+
+    def _to_jax(self, x: torch.Tensor) -> jax.Array:
+        if not self._on_gpu:
+            return jax.numpy.asarray(x.numpy())
+        self._lent.append(x.contiguous().clone())
+        return jax.dlpack.from_dlpack(self._lent[-1])
 
     def _to_torch(self, x: jax.Array) -> torch.Tensor:
         return torch.from_dlpack(x) if self._on_gpu else torch.from_numpy(np.array(x))
+
+
+def _by_name(state: State) -> dict[str, jax.Array]:
+    """The arrays of a state, in their order, by the names of its fields joined by dots."""
+    paths = jax.tree_util.tree_flatten_with_path(state)[0]
+    return {".".join(part.name for part in path): leaf for path, leaf in paths}  # type: ignore[attr-defined]
+
+
+def _saved(x: np.ndarray) -> torch.Tensor:
+    # torch lacks most operations on unsigned 32-bit numbers
+    return torch.from_numpy(x.astype(np.int64) if x.dtype == np.uint32 else x.copy())

@@ -9,12 +9,13 @@ from typing import Any
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
+from vinl.gait.observation import STEPPING_TABLE
 from vinl.loco.config import LocoConfig
-from vinl.policies.card import PolicyCard, find_detour
+from vinl.policies.card import PolicyCard, find_gait
 from vinl.policies.identity import digest_tensors
 from vinl.policies.io import find_policy, load_policy
 from vinl.policies.lineage import trace_lineage
-from vinl.policies.networks import BlindActor, MapActor
+from vinl.policies.networks import MapActor, StepActor
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
 
 
@@ -66,25 +67,27 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
         config: of the training that shall start from them.
 
     Raises:
-        InputError: no such policy, one of another kind, of other sizes or with other joint gains.
+        InputError: no such policy, one of another kind, of other sizes, with another gait or with other joint gains.
     """
     policy = load_policy(name_or_path)
     network, p = policy.network, config.ppo
-    fresh = MapActor(encoder=p.encoder, code=p.code, actor=p.actor) if p.map else BlindActor(actor=p.actor)
+    sizes: dict[str, Any] = {"proprioception": STEPPING_TABLE.size, "actor": p.actor}
+    fresh = MapActor(encoder=p.encoder, code=p.code, **sizes) if p.scan else StepActor(**sizes)
     given, wanted = network.describe(), fresh.describe()
+    if policy.card.kind == "locomotion":
+        _check_gait(name_or_path, policy.card, config)
     if given != wanted:
         raise InputError(
             f"--from {name_or_path}: its network {_list(given)} is not that of this training "
-            f"{_list(wanted)}; set ppo.map, ppo.encoder, ppo.code and ppo.actor to its own, or give another policy"
+            f"{_list(wanted)}; set ppo.scan, ppo.encoder, ppo.code and ppo.actor to its own, or give another policy"
         )
-    _refuse_detour(name_or_path, policy.card)
     check_gains(name_or_path, policy.card, config)
     actor = {name: weight.clone() for name, weight in network.state_dict().items()}
     critic = _load_critic(name_or_path, config)
     return WarmStart(actor, critic, find_origin(policy.card, network, critic is not None))
 
 
-def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origin]:
+def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[StepActor, Origin]:
     """The teacher of a student, and where it comes from.
 
     Args:
@@ -92,34 +95,47 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[MapActor, Origi
         config: of the student's training.
 
     Raises:
-        InputError: no such policy, one that does not read the height scan, one whose commands are bent, or one with
-            other joint gains.
+        InputError: no such policy, one that is no ``StepActor``, one with another gait or none, or one with other
+            joint gains.
     """
     policy = load_policy(name_or_path)
-    if not isinstance(policy.network, MapActor):
+    if policy.card.kind == "locomotion":
+        _check_gait(name_or_path, policy.card, config)
+    if not isinstance(policy.network, StepActor):
         kind = _KINDS.get(type(policy.network).__name__, type(policy.network).__name__)
         raise InputError(
-            f"--from {name_or_path}: a student learns from a locomotor with a height scan (MapActor, such as "
-            f"vinl/teacher); this is {kind}"
+            f"--from {name_or_path}: a student learns from a locomotor that knows where its feet shall go (StepActor, "
+            f"such as vinl/teacher); this is {kind}"
         )
-    _refuse_detour(name_or_path, policy.card)
     check_gains(name_or_path, policy.card, config)
     return policy.network, find_origin(policy.card, policy.network, critic=False)
 
 
 _KINDS = {
-    "BlindActor": "a locomotor without a map (BlindActor)",
-    "DepthActor": "a student itself (DepthActor)",
+    "MapActor": "one that needs a height scan, too (MapActor)",
+    "SteppingActor": "a student itself (SteppingActor)",
     "NavActor": "a navigator (NavActor)",
 }
 
 
-def _refuse_detour(name_or_path: str, card: PolicyCard) -> None:
-    if find_detour(card) is not None:
+def _check_gait(name_or_path: str, card: PolicyCard, config: LocoConfig) -> None:
+    """Refuse a policy that knows no gait, as those from before there was one (their commands may be bent, too), or
+    that walks with another.
+
+    Raises:
+        InputError: it does.
+    """
+    gait = find_gait(card)
+    if gait is None:
         raise InputError(
-            f"--from {name_or_path}: it was trained with commands that a planner bends, and no training has these any "
-            "more; give a policy without detours, or train one: vinl train-loco --stage 2"
+            f"--from {name_or_path}: it was trained without the gait, which every training has now; train a new one: "
+            "vinl train-loco --stage 1, then --stage 2 --from its run"
         )
+    # with a map or without one, what a policy observes of its gait means the same
+    other = [name for name, value in asdict(gait).items() if name != "map" and value != getattr(config.gait, name)]
+    if other:
+        own = " ".join(f"gait.{name}={asdict(gait)[name]}" for name in other)
+        raise InputError(f"--from {name_or_path}: it walks with another gait; set {own}, or give another policy")
 
 
 def check_gains(name_or_path: str, card: PolicyCard, config: LocoConfig) -> None:

@@ -10,8 +10,10 @@ from typing import Any, Literal
 
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
+from vinl.gait.config import GaitConfig
+from vinl.gait.observation import GAIT_ROWS
 from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP
-from vinl.robot.observation import HEIGHT_SCAN, PROPRIOCEPTION, TABLE
+from vinl.robot.observation import HEIGHT_SCAN, PROPRIOCEPTION, ObservationTable
 from vinl.sensing.detour import DetourConfig
 
 SCHEMA = 1
@@ -32,6 +34,7 @@ class PolicyCard:
         action: ``scale`` [rad], ``default_pose`` [rad], ``kp`` [N m/rad], ``kd`` [N m s/rad] that it was trained with;
             of a navigator ``forward_speed`` [m/s] and ``yaw_rate`` [rad/s] at the actions -1 and 1.
         camera: the depth camera that it sees through, or None.
+        gait: of a locomotor, the settings of the gait that it observes (``gait.config.GaitConfig``); None: it has none.
         training: the resolved training configuration.
         seed: of the training run.
         samples: environment steps that it learned from.
@@ -46,6 +49,7 @@ class PolicyCard:
     observation: list[dict[str, Any]]
     action: dict[str, Any]
     camera: dict[str, Any] | None = None
+    gait: dict[str, Any] | None = None
     training: dict[str, Any] = field(default_factory=dict)
     seed: int = 0
     samples: int = 0
@@ -95,6 +99,8 @@ def locomotion_card(
     network: dict[str, Any],
     action: dict[str, Any] | None = None,
     scan: bool = True,
+    gait: dict[str, Any] | None = None,
+    table: ObservationTable | None = None,
     **rest: Any,
 ) -> PolicyCard:
     """A locomotion card with this robot's observation table and, unless given, action; ``rest`` are further fields.
@@ -104,9 +110,26 @@ def locomotion_card(
         network: as ``PolicyNetwork.describe`` gives it.
         action: scale, default pose and gains.
         scan: whether it observes the height scan; a policy that sees through a camera does not.
+        gait: settings of the gait whose rows it observes; None: it observes none.
+        table: what it observes, where that is another than ``scan`` and ``gait`` say.
     """
-    table = (TABLE if scan else PROPRIOCEPTION).describe()
-    return PolicyCard("locomotion", name, network, table, action or describe_action(), **rest)
+    rows = (table or locomotion_table(scan, gait is not None)).describe()
+    return PolicyCard("locomotion", name, network, rows, action or describe_action(), gait=gait, **rest)
+
+
+def locomotion_table(scan: bool, gait: bool) -> ObservationTable:
+    """What a locomotor observes: proprioception, then the rows of its gait, then the height scan."""
+    rows = [*PROPRIOCEPTION, *(GAIT_ROWS if gait else ()), *((HEIGHT_SCAN,) if scan else ())]
+    return ObservationTable(tuple(rows))
+
+
+def find_gait(card: PolicyCard) -> GaitConfig | None:
+    """The gait whose rows a locomotor observes; None: it observes none.
+
+    Raises:
+        InputError: the card asks for a gait that there cannot be.
+    """
+    return None if card.gait is None else build_config(GaitConfig, card.gait, source=f"{card.name}: gait")
 
 
 def reads_ground(card: PolicyCard) -> bool:

@@ -14,13 +14,22 @@ from torch import Tensor
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.config.paths import assets_dir
-from vinl.policies.card import CARD_FILE, PolicyCard, find_previous, navigation_table, read_card, write_card
+from vinl.gait.observation import SENSED_TABLE
+from vinl.policies.card import (
+    CARD_FILE,
+    PolicyCard,
+    find_gait,
+    find_previous,
+    locomotion_table,
+    navigation_table,
+    read_card,
+    write_card,
+)
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.device import choose_device
 from vinl.policies.lineage import with_lineage
 from vinl.policies.networks import PolicyNetwork, build_network
 from vinl.policies.policy import LocomotionPolicy
-from vinl.robot.observation import PROPRIOCEPTION, PROPRIOCEPTION_SIZE, TABLE
 
 WEIGHTS_FILE = "policy.safetensors"
 
@@ -134,9 +143,10 @@ def _check_against_robot(card: PolicyCard, folder: Path, network: PolicyNetwork,
     if card.kind == "navigation":
         wanted, actions = navigation_table(find_previous(card)), 2
     else:
-        # what sees needs no height scan
-        table = PROPRIOCEPTION if network.observation_size == PROPRIOCEPTION_SIZE else TABLE
-        wanted, actions = table.describe(), 12
+        find_gait(card)
+        tables = [*(locomotion_table(scan, card.gait is not None) for scan in (True, False)), SENSED_TABLE]
+        fitting = [table for table in tables if table.size == network.observation_size]
+        wanted, actions = (fitting or tables)[0].describe(), 12
     if network.action_size != actions or (card.kind == "navigation" and not sees):
         name, given = card.network["class"], network.action_size
         raise InputError(

@@ -107,6 +107,24 @@ class BlindActor(PolicyNetwork):
         return self.actor(observation[..., : self.proprioception])
 
 
+class StepActor(PolicyNetwork):
+    """The deterministic locomotion actor of planned footholds: proprioception and the rows of the gait to an action.
+
+    What it knows of the ground is where its feet shall go. Parameters are named ``actor.*``.
+    """
+
+    def __init__(self, proprioception: int, actor: Sequence[int] = (512, 256, 128), actions: int = 12) -> None:
+        """``proprioception`` counts the rows of the gait too; ``actor`` are the widths of the hidden layers."""
+        super().__init__()
+        self.arguments = {"proprioception": proprioception, "actor": list(actor), "actions": actions}
+        self.observation_size, self.action_size = proprioception, actions
+        self.actor = mlp([proprioception, *actor, actions], nn.ELU)
+
+    def forward(self, observation: Float[Tensor, "n observation"]) -> Float[Tensor, "n actions"]:
+        """Scaled observations in the order of ``gait.observation.STEPPING_TABLE`` to actions."""
+        return self.actor(observation)
+
+
 def mlp(sizes: Sequence[int], activation: Callable[[], nn.Module]) -> nn.Sequential:
     """Linear layers through ``sizes`` with ``activation`` between them and none at the end."""
     layers: list[nn.Module] = []

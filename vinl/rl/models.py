@@ -11,7 +11,7 @@ from rsl_rl.modules.distribution import GaussianDistribution
 from tensordict import TensorDict
 from torch import nn
 
-from vinl.policies.networks import BlindActor, MapActor, mlp
+from vinl.policies.networks import MapActor, StepActor, mlp
 from vinl.robot.observation import PROPRIOCEPTION_SIZE
 
 
@@ -31,48 +31,65 @@ class MapModel(MLPModel):
     is given behind the proprioception.
 
     Args:
+        proprioception: numbers before the height scan.
         encoder: widths of the encoder's hidden layers.
         code: size of the map code.
         rest: as for ``MLPModel``.
     """
 
-    def __init__(self, *args: Any, encoder: Sequence[int] = (128, 64), code: int = 32, **rest: Any) -> None:
-        self._code_size = code
+    def __init__(
+        self,
+        *args: Any,
+        proprioception: int = PROPRIOCEPTION_SIZE,
+        encoder: Sequence[int] = (128, 64),
+        code: int = 32,
+        **rest: Any,
+    ) -> None:
+        self._front, self._code_size = proprioception, code
         super().__init__(*args, **rest)
-        self._encoder_sizes = (self.obs_dim - PROPRIOCEPTION_SIZE, *encoder, code)
+        self._encoder_sizes = (self.obs_dim - proprioception, *encoder, code)
         self.encoder = mlp(self._encoder_sizes, nn.ReLU)
 
     def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> torch.Tensor:
-        """Proprioception and map code, (n, 48 + code)."""
+        """Proprioception and map code, (n, proprioception + code)."""
         full = super().get_latent(obs, masks, hidden_state)
-        return torch.cat([full[..., :PROPRIOCEPTION_SIZE], self.encoder(full[..., PROPRIOCEPTION_SIZE:])], -1)
+        return torch.cat([full[..., : self._front], self.encoder(full[..., self._front :])], -1)
 
     def _get_latent_dim(self) -> int:
-        return PROPRIOCEPTION_SIZE + self._code_size
+        return self._front + self._code_size
 
     def export(self) -> MapActor:
         """The deterministic actor with the same weights, as policies are shipped."""
         *hidden, actions = _widths(self)
         scan, *encoder, code = self._encoder_sizes
-        actor = MapActor(scan=scan, encoder=encoder, code=code, actor=hidden, actions=actions)
+        actor = MapActor(self._front, scan, encoder, code, hidden, actions)
         actor.load_state_dict(_shipped_names(self))
         return actor
 
 
-class BlindModel(MLPModel):
-    """rsl-rl actor that sees no map: proprioception alone goes into the MLP."""
+class StepModel(MLPModel):
+    """rsl-rl actor that is not given the height scan: proprioception and the rows of the gait go into the MLP.
+
+    Args:
+        proprioception: numbers before the height scan.
+        rest: as for ``MLPModel``.
+    """
+
+    def __init__(self, *args: Any, proprioception: int = PROPRIOCEPTION_SIZE, **rest: Any) -> None:
+        self._front = proprioception
+        super().__init__(*args, **rest)
 
     def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> torch.Tensor:
-        """Proprioception, (n, 48)."""
-        return super().get_latent(obs, masks, hidden_state)[..., :PROPRIOCEPTION_SIZE]
+        """Everything before the height scan."""
+        return super().get_latent(obs, masks, hidden_state)[..., : self._front]
 
     def _get_latent_dim(self) -> int:
-        return PROPRIOCEPTION_SIZE
+        return self._front
 
-    def export(self) -> BlindActor:
+    def export(self) -> StepActor:
         """The deterministic actor with the same weights, as policies are shipped."""
         *hidden, actions = _widths(self)
-        actor = BlindActor(scan=self.obs_dim - PROPRIOCEPTION_SIZE, actor=hidden, actions=actions)
+        actor = StepActor(self._front, hidden, actions)
         actor.load_state_dict(_shipped_names(self))
         return actor
 

@@ -25,8 +25,11 @@ ACTION_SCALE = 0.25
 MASS = 24.937
 """Of the whole robot [kg] [Unitree aliengo.urdf]."""
 
+TORQUE_LIMIT = np.array([35.278, 35.278, 44.4] * 4)
+"""Largest torque of every joint [N m] [Unitree aliengo.urdf]."""
+
 JOINT_SPEED_LIMIT = np.array([20.0, 20.0, 15.89] * 4)
-"""Fastest speed of every joint [rad/s] [Unitree aliengo.urdf]. The simulated motors do not know it."""
+"""Fastest speed of every joint [rad/s] [Unitree aliengo.urdf]. The simulated motors of MuJoCo C do not know it."""
 
 PHYSICS_DT = 0.005
 """Physics step [s] [ViNL config]."""

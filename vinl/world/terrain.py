@@ -14,7 +14,7 @@ from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
-from vinl.world.hurdles import draw_hurdles
+from vinl.world.hurdles import draw_bars, draw_hurdles
 from vinl.world.rooms_tile import draw_rooms
 
 RESOLUTION = 0.05
@@ -37,7 +37,8 @@ class TerrainConfig:
     """Which tiles lie where. Levels run along x, columns along y; every column holds one type.
 
     Attributes:
-        slope, rough_slope, stairs_up, stairs_down, discrete, walls, blocks, rooms, hurdles: shares of the columns.
+        slope, rough_slope, stairs_up, stairs_down, discrete, walls, blocks, rooms, hurdles, bars: fractions of the
+            columns. ``hurdles`` are closed rings, ``bars`` reach from side to side: nobody walks around either.
         levels: rows of rising difficulty; difficulty of level k is k / levels, 0 to 0.9 for ten [ViNL code].
         columns: columns of tiles.
         seed: of everything random in the tiles.
@@ -46,8 +47,12 @@ class TerrainConfig:
         tall_density: furniture-like tall boxes per m2 on ``blocks`` and ``walls`` tiles beyond the first level.
         start_clear: half-width of the square around the start without blocks [m].
         wall_blocks: blocks on ``walls`` and ``rooms`` tiles, as a share of those on ``blocks`` tiles.
-        first_height: range of the blocks' heights on the first level [m], from which they grow evenly to
+        first_height: range of the blocks' heights up to the middle level [m], from which they grow evenly to
             ``block_height`` on the last; None: ``block_height`` on all levels.
+        depth: of rings and bars, and of blocks up to 0.2 m, on the first level and from the middle one on [m]; between
+            them it grows evenly. Depth comes before height: with random steps a foot comes down clear of a bar 5 cm
+            deep in half of the crossings, of one 0.2 m deep in an eighth.
+        ghost: fraction of the training in which blocks are on the map and judged, but nothing to collide with.
     """
 
     slope: float = 0.10
@@ -59,6 +64,7 @@ class TerrainConfig:
     blocks: float = 0.0
     rooms: float = 0.0
     hurdles: float = 0.0
+    bars: float = 0.0
     levels: int = 10
     columns: int = 20
     seed: int = 0
@@ -68,6 +74,8 @@ class TerrainConfig:
     start_clear: float = 0.8
     wall_blocks: float = 0.0
     first_height: tuple[float, float] | None = None
+    depth: tuple[float, float] = (0.2, 0.2)
+    ghost: float = 0.0
 
     def __post_init__(self) -> None:
         if self.levels < 1 or self.columns < 1:
@@ -81,23 +89,31 @@ class TerrainConfig:
             raise InputError(f"terrain: first_height must be a rising positive range, got {self.first_height}")
         if min(self.block_density, self.tall_density) < 0:
             raise InputError("terrain: densities must not be negative")
-        if not 0 <= self.wall_blocks <= 1:
-            raise InputError("terrain: wall_blocks must lie in [0, 1]")
+        if not 0 < self.depth[0] <= self.depth[1]:
+            raise InputError(f"terrain: depth must be a rising positive range, got {self.depth}")
+        for name in ("wall_blocks", "ghost"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise InputError(f"terrain: {name} must lie in [0, 1], got {getattr(self, name)}")
         if self.start_clear < 0:
             raise InputError("terrain: start_clear must not be negative")
 
     def shares(self) -> dict[str, float]:
         """Share of every tile type, in the order of the columns."""
         flat = ("slope", "rough_slope", "stairs_up", "stairs_down", "discrete")
-        return {name: getattr(self, name) for name in (*flat, "walls", "blocks", "rooms", "hurdles")}
+        return {name: getattr(self, name) for name in (*flat, "walls", "blocks", "rooms", "hurdles", "bars")}
 
     def heights_at(self, level: int) -> tuple[float, float]:
         """Range of the blocks' heights on a level [m]."""
         if self.first_height is None:
             return self.block_height
-        part = level / max(self.levels - 1, 1)
+        part = max(2 * level / max(self.levels - 1, 1) - 1, 0.0)
         low, high = (a + part * (b - a) for a, b in zip(self.first_height, self.block_height, strict=True))
         return low, high
+
+    def depth_at(self, level: int) -> float:
+        """Depth of rings and bars on a level [m]."""
+        part = min(2 * level / max(self.levels - 1, 1), 1.0)
+        return self.depth[0] + part * (self.depth[1] - self.depth[0])
 
     def column_kinds(self) -> list[str]:
         """The tile type of every column."""
@@ -176,12 +192,14 @@ def scatter_centres(
     return np.array(kept[len(taken) :]).reshape(-1, 2)
 
 
-def draw_blocks(rng: np.random.Generator, centres: Float[np.ndarray, "n 2"], height: tuple[float, float]) -> Blocks:
-    """Blocks of 0.2-0.5 x 0.2 m with any yaw on the given points [paper IV-A]."""
+def draw_blocks(
+    rng: np.random.Generator, centres: Float[np.ndarray, "n 2"], height: tuple[float, float], depth: float = 0.2
+) -> Blocks:
+    """Blocks of 0.2-0.5 x 0.2 m, or of another depth, with any yaw on the given points [paper IV-A]."""
     n = len(centres)
     return Blocks(
         np.column_stack(
-            [centres, rng.uniform(0, np.pi, n), rng.uniform(0.2, 0.5, n), np.full(n, 0.2), rng.uniform(*height, n)]
+            [centres, rng.uniform(0, np.pi, n), rng.uniform(0.2, 0.5, n), np.full(n, depth), rng.uniform(*height, n)]
         )
     )
 
@@ -226,10 +244,11 @@ def build_terrain(config: TerrainConfig) -> Terrain:
                 ground.heights[i : i + CELLS, j : j + CELLS] = tiles[kind]()
                 continue
             none = np.zeros((0, 2))
-            if kind == "hurdles":
+            if kind in ("hurdles", "bars"):
                 if k > 0:
-                    rings = draw_hurdles(rng, TILE, config.start_clear, config.heights_at(k)).rows
-                    blocks.append(Blocks(rings + shift[:6]))
+                    draw = draw_hurdles if kind == "hurdles" else draw_bars
+                    drawn = draw(rng, TILE, config.start_clear, config.heights_at(k), config.depth_at(k)).rows
+                    blocks.append(Blocks(drawn + shift[:6]))
             elif kind == "rooms":
                 tall.append(Boxes(draw_rooms(rng, TILE, difficulty).rows + shift))
                 if config.wall_blocks > 0:
@@ -270,7 +289,7 @@ def _tile_blocks(
     wanted = share * config.block_density * TILE**2 * level / max(config.levels - 1, 1)
     clear = config.start_clear + 0.3  # half a block's diagonal more
     centres = scatter_centres(rng, round(wanted), TILE / 2, clear, 0.45, taken)
-    blocks = draw_blocks(rng, centres, config.heights_at(level))
+    blocks = draw_blocks(rng, centres, config.heights_at(level), min(config.depth_at(level), 0.2))
     return Blocks(blocks.rows + np.array([*middle, 0, 0, 0, 0]))
 
 

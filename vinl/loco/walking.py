@@ -1,0 +1,131 @@
+"""The gait of the training's robots: clock, footholds from the exact map, and how well feet keep to them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from vinl.gait.clock import swing_fraction
+from vinl.gait.config import GaitConfig
+from vinl.gait.footholds import plan_footholds
+from vinl.gait.ground_view import FieldView
+from vinl.gait.local_map import POINTS
+from vinl.gait.path import swing_path
+from vinl.gait.state import (
+    GaitState,
+    Plan,
+    aim,
+    feet_in_heading_frame,
+    motion_between,
+    start_gait,
+    swings,
+    tick,
+    velocity_in_heading_frame,
+)
+from vinl.loco.rewards import MIDDLE
+from vinl.loco.simulation import Body, Ground
+from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS
+from vinl.world.grid import GridFrame
+
+
+class Walk(NamedTuple):
+    """What the gait remembers of the robots, and the plan that it follows.
+
+    Attributes:
+        gait: clock, paths and footholds.
+        plan: of the last control step.
+    """
+
+    gait: GaitState
+    plan: Plan
+
+
+class Steps(NamedTuple):
+    """How the feet kept to the gait in a control step.
+
+    Attributes:
+        path_error: (n, 4, 3) from each foot to its path [m]; 0 of feet that stand.
+        swing, middle: (n, 4) which feet swing, and are in the middle of it.
+        blocked: (n, 4) swinging feet whose foothold is on a block or nearer to one than ``gait.edge``.
+        speed: (n, 4) of the feet along the ground [m/s].
+        height: (n,) of the trunk over the feet that stand [m].
+    """
+
+    path_error: Float[Array, "n 4 3"]
+    swing: Bool[Array, "n 4"]
+    middle: Bool[Array, "n 4"]
+    blocked: Bool[Array, "n 4"]
+    speed: Float[Array, "n 4"]
+    height: Float[Array, " n"]
+
+
+def start_walk(config: GaitConfig, body: Body) -> Walk:
+    """Of robots that stand where they are."""
+    feet = feet_in_heading_frame(jnp, body.qpos)
+    level = 0 * feet[..., 2]
+    return Walk(start_gait(jnp, config, feet), Plan(0 * feet[..., :2], level, level + config.lift, level + 1.0))
+
+
+def go_on(
+    config: GaitConfig,
+    ground: Ground,
+    frame: GridFrame,
+    walk: Walk,
+    before: Body,
+    body: Body,
+    command: Float[Array, "n 3"],
+) -> tuple[Walk, Steps]:
+    """One control step of the gait, planned on the exact map and with the exact velocity.
+
+    Args:
+        config: of the gait.
+        ground, frame: the map and where its cells lie.
+        walk: before the step.
+        before, body: the robots before and after the step.
+        command: that they have.
+    """
+    feet, velocity = feet_in_heading_frame(jnp, body.qpos), velocity_in_heading_frame(jnp, body.qpos, body.qvel)
+    moved = motion_between(jnp, before.qpos, body.qpos)
+    gait = tick(jnp, config, walk.gait, moved, command, feet)
+    view = FieldView(jnp, ground.map, frame, body.qpos)
+    plan = plan_footholds(jnp, config, view if config.map else None, gait, velocity, command, feet)
+    gait = aim(jnp, config, gait, plan, velocity, command, feet)
+
+    swing, fraction = swings(jnp, config, gait), swing_fraction(jnp, config, gait.period)[:, None]
+    progress = gait.phases / fraction
+    stands = jnp.where(swing, 0.0, 1.0)
+    below = jnp.sum(stands * feet[..., 2], 1) / jnp.maximum(stands.sum(1), 1.0)
+    gap = view.clearance(gait.target) - FOOT_RADIUS
+    last = feet_in_heading_frame(jnp, before.qpos)
+    turned = moved[:, None, 3:]
+    carried = last[..., :2] - moved[:, None, :2]
+    c, s = jnp.cos(turned[..., 0]), jnp.sin(turned[..., 0])
+    x, y = c * carried[..., 0] + s * carried[..., 1], c * carried[..., 1] - s * carried[..., 0]
+    steps = Steps(
+        path_error=swing_path(jnp, config, gait, feet) - feet,
+        swing=swing,
+        middle=swing & (progress > MIDDLE[0]) & (progress < MIDDLE[1]),
+        blocked=swing & (gap < config.edge),
+        speed=jnp.hypot(feet[..., 0] - x, feet[..., 1] - y) / CONTROL_DT,
+        height=FOOT_RADIUS - below,
+    )
+    return Walk(gait, plan), steps
+
+
+def local_heights(
+    config: GaitConfig, ground: Ground, frame: GridFrame, gait: GaitState, body: Body
+) -> Float[Array, "n 741"]:
+    """The ground about every robot at ``local_map.POINTS``, above the floor under the feet that stand [m]."""
+    feet = feet_in_heading_frame(jnp, body.qpos)
+    stands = jnp.where(swings(jnp, config, gait), 0.0, 1.0)
+    floor = jnp.sum(stands * feet[..., 2], 1) / jnp.maximum(stands.sum(1), 1.0) - FOOT_RADIUS
+    points = jnp.broadcast_to(jnp.asarray(POINTS, jnp.float32), (len(feet), *POINTS.shape))
+    return FieldView(jnp, ground.map, frame, body.qpos).height(points) - floor[:, None]
+
+
+def flatten_plan(plan: Plan) -> Float[Array, "n 20"]:
+    """A plan as numbers: offsets, rises and apexes [m], rates; legs in the order of ``LEGS``."""
+    n = plan.rise.shape[0]
+    return jnp.concatenate([plan.offset.reshape(n, -1), plan.rise, plan.apex, plan.rate], -1)
