@@ -15,7 +15,7 @@ from jaxtyping import Float
 from rich.console import Console
 from rich.table import Table
 
-from vinl.chain.robot import Robot, joint_targets
+from vinl.chain.robot import Robot, Robots
 from vinl.chain.workers import one_thread
 from vinl.courses.grounds import GroundConfig, build_ground
 from vinl.courses.trial import controller_on_course
@@ -44,20 +44,18 @@ def walk(policy: Policy, speeds: list[float], seconds: float) -> Float[np.ndarra
     """Where the feet of robots are that walk at these speeds [m/s], at every control step after ``SETTLE`` [m]."""
     action = policy.card.action
     ground = build_ground(GroundConfig("blocks", 0.0, None, 0, float(action["kp"]), float(action["kd"])))
-    robots = [Robot(ground.model) for _ in speeds]
-    for robot in robots:
+    each = [Robot(ground.model) for _ in speeds]
+    for robot in each:
         robot.spawn(-seconds / 2, 0.0, 0.0, DEFAULT_POSE)
-    actions, places = np.zeros((len(speeds), 12), np.float32), []
+    robots, places = Robots(each), []
     with one_thread():
-        policy.reset(len(speeds))
         controller = controller_on_course(policy, ground, len(speeds))
+        controller.reset(len(speeds))
         for _ in range(round((SETTLE + seconds) / CONTROL_DT)):
-            qpos, qvel = np.stack([w.qpos for w in robots]), np.stack([w.qvel for w in robots])
-            turn = np.clip(-1.5 * yaw_of(np, qpos[:, 3:7]), -0.5, 0.5)
-            actions = controller.act(qpos, qvel, np.stack([speeds, np.zeros(len(speeds)), turn], 1), actions)
-            for robot, target in zip(robots, joint_targets(actions, policy.card), strict=True):
-                robot.step(target)
-            places.append(foot_positions(np, np.stack([w.qpos for w in robots])))
+            turn = np.clip(-1.5 * yaw_of(np, robots.qpos[:, 3:7]), -0.5, 0.5)
+            command = np.stack([speeds, np.zeros(len(speeds)), turn], 1)
+            robots.step(controller.step(robots.qpos, robots.qvel, command))
+            places.append(foot_positions(np, robots.qpos))
     return np.stack(places)[round(SETTLE / CONTROL_DT) :]
 
 

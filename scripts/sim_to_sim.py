@@ -23,11 +23,12 @@ from rich.console import Console
 from rich.table import Table
 
 from vinl.chain.choose import check_locomotion_policy
+from vinl.chain.config import MAX_TILT
 from vinl.chain.workers import one_thread
 from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import COMMANDS, Course, Start, choose_commands, command_ranges
 from vinl.courses.grounds import Ground, GroundConfig, build_ground
-from vinl.courses.herd import MAX_TILT, BoxHerd, Herd
+from vinl.courses.herd import BoxHerd, Herd
 from vinl.courses.robot_records import RobotRecord, aggregate_robots
 from vinl.courses.trial import run_trial
 from vinl.loco.randomisation import plain_traits

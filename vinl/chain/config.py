@@ -10,6 +10,9 @@ from vinl.config.errors import InputError
 from vinl.sensing.odometry_config import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig
 
+MAX_TILT = math.radians(72)
+"""A trunk tilted farther than this has fallen [rad]."""
+
 
 @dataclass(frozen=True)
 class OracleConfig:
@@ -67,7 +70,7 @@ class EvaluationConfig:
     min_distance: float = 5.0
     clearance: float = 0.5
     joint_noise: float = 0.05
-    max_tilt: float = math.radians(72)
+    max_tilt: float = MAX_TILT
     stuck_window: float = 20.0
     stuck_distance: float = 0.5
     ceiling: float | None = None

@@ -1,58 +1,83 @@
-"""What the locomotors of a unit observe: the numbers that the card names, and depth if they have a camera."""
+"""One control step of a locomotion policy: observe, act, joint targets."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.chain.ground_map import GroundMap
 from vinl.chain.real_cameras import CameraErrors, RealCameras
 from vinl.config.errors import InputError
-from vinl.policies.card import find_detour, reads_ground
+from vinl.policies.card import PolicyCard, find_detour, reads_ground
 from vinl.policies.policy import Policy
-from vinl.robot.observation import SCAN_SIZE, observe
+from vinl.robot.aliengo import DEFAULT_POSE
+from vinl.robot.observation import observe
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
 
+ACTION_LIMIT = 100.0
+"""Actions are held to +- this [ViNL config]."""
+
 
 class LocomotionController:
-    """Asks a locomotor for the next action of all robots of a unit.
+    """One control step of a locomotion policy for n robots: observe, act, joint targets. Remembers the last actions.
 
     A policy of 48 numbers gets only proprioception, one of 235 the height scan too; one with a camera gets
     depth.
 
     Args:
-        locomotor: the policy.
+        policy: the locomotion policy.
         scan: reads the height scan that the policy observes, and bends its commands if it was trained so; None: it
             observes none.
         cameras: renders depth; needed only by a policy with a camera.
+
+    Attributes:
+        policy: as given.
+        actions: (n, 12) the last ones; none before the first ``reset``.
     """
 
-    def __init__(self, locomotor: Policy, scan: GroundMap | None, cameras: DepthCameras | RealCameras | None) -> None:
-        self._locomotor, self._scan, self._cameras = locomotor, scan, cameras
-        self._size = locomotor.card.observation_size
+    def __init__(self, policy: Policy, scan: GroundMap | None, cameras: DepthCameras | RealCameras | None) -> None:
+        self.policy, self._scan, self._cameras = policy, scan, cameras
+        self.actions = np.zeros((0, 12), np.float32)
 
-    def act(
+    def reset(self, which: int | Bool[np.ndarray, " n"]) -> None:
+        """So many robots begin, or those that a mask marks begin anew: the past is forgotten."""
+        self.policy.reset(which)
+        if isinstance(which, int):
+            self.actions = np.zeros((which, 12), np.float32)
+        else:
+            self.actions[which] = 0
+
+    def step(
         self,
         qpos: Float[np.ndarray, "n 19"],
         qvel: Float[np.ndarray, "n 18"],
         command: Float[np.ndarray, "n 3"],
-        actions: Float[np.ndarray, "n 12"],
         rows: Sequence[int] | None = None,
     ) -> Float[np.ndarray, "n 12"]:
-        """The next actions. ``actions`` are the last ones, ``rows`` those still alive (``DepthCameras.look``)."""
-        ground = np.zeros((len(qpos), SCAN_SIZE))
+        """Joint targets [rad] of the next control step.
+
+        Args:
+            qpos, qvel: state of every robot, as MuJoCo has it.
+            command: forward [m/s], left [m/s], yaw rate [rad/s].
+            rows: the robots still alive, see ``DepthCameras.look``; None: all.
+
+        Raises:
+            InputError: the policy's answer is none.
+        """
+        ground = None
         if self._scan is not None:
             ground, command = self._scan.read(qpos), self._scan.bend(qpos, command)
-        observation = observe(np, qpos, qvel, command, actions, ground)[:, : self._size]
+        observation = observe(np, qpos, qvel, command, self.actions, ground)
         if self._cameras is None:
-            answer = self._locomotor.act(observation)
+            answer = self.policy.act(observation)
         else:
-            answer = self._locomotor.act(observation, self._cameras.look(qpos, rows))
-        return check_actions(answer, len(qpos), self._locomotor)
+            answer = self.policy.act(observation, self._cameras.look(qpos, rows))
+        self.actions = check_actions(answer, len(qpos), self.policy)
+        return joint_targets(self.actions, self.policy.card)
 
 
 def open_controller(
@@ -85,3 +110,10 @@ def check_actions(actions: np.ndarray, n: int, locomotor: Policy) -> np.ndarray:
     if not np.isfinite(actions).all():
         raise InputError(f"locomotor {locomotor.card.name} returned actions that are not finite (NaN or infinite)")
     return actions
+
+
+def joint_targets(actions: Float[np.ndarray, "n 12"], card: PolicyCard) -> Float[np.ndarray, "n 12"]:
+    """Actions of a policy as joint targets [rad]."""
+    pose = np.asarray(card.action.get("default_pose", DEFAULT_POSE), dtype=np.float64)
+    held = np.clip(actions.astype(np.float64), -ACTION_LIMIT, ACTION_LIMIT)
+    return pose + float(card.action["scale"]) * held

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 
 import mujoco
 import numpy as np
@@ -10,11 +11,7 @@ from jaxtyping import Float
 
 from vinl.chain.contacts import ContactReader
 from vinl.chain.delay_line import DelayLine
-from vinl.policies.card import PolicyCard
-from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, STANDING_HEIGHT, SUBSTEPS, home_qpos
-
-ACTION_LIMIT = 100.0
-"""Actions are held to +- this [ViNL config]."""
+from vinl.robot.aliengo import CONTROL_DT, STANDING_HEIGHT, SUBSTEPS, home_qpos
 
 
 class Robot:
@@ -60,8 +57,29 @@ class Robot:
         return bool(self.contacts.trunk_on_ground or broken or upright < math.cos(max_tilt))
 
 
-def joint_targets(actions: Float[np.ndarray, "n 12"], card: PolicyCard) -> Float[np.ndarray, "n 12"]:
-    """Actions of a policy as joint targets [rad]."""
-    pose = np.asarray(card.action.get("default_pose", DEFAULT_POSE), dtype=np.float64)
-    held = np.clip(actions.astype(np.float64), -ACTION_LIMIT, ACTION_LIMIT)
-    return pose + float(card.action["scale"]) * held
+class Robots:
+    """Several robots side by side, each in MuJoCo data of its own.
+
+    Attributes:
+        qpos: (n, 19), qvel: (n, 18) of all, as after the last step or start.
+    """
+
+    def __init__(self, robots: Sequence[Robot]) -> None:
+        self._robots = list(robots)
+        self.qpos, self.qvel = (np.stack([getattr(r, name) for r in robots]) for name in ("qpos", "qvel"))
+
+    def __getitem__(self, k: int) -> Robot:
+        return self._robots[k]
+
+    def __len__(self) -> int:
+        return len(self._robots)
+
+    def step(self, targets: Float[np.ndarray, "n 12"], rows: Iterable[int] | None = None) -> None:
+        """One control step to joint targets [rad], of all robots or of those named; the others stay as they are."""
+        for k in range(len(self)) if rows is None else rows:
+            self._robots[k].step(targets[k])
+            self.read(k)
+
+    def read(self, k: int) -> None:
+        """Take over the state of a robot that was put somewhere."""
+        self.qpos[k], self.qvel[k] = self._robots[k].qpos, self._robots[k].qvel

@@ -20,7 +20,7 @@ from vinl.chain.navigators.base import Navigator, Task, check_choice
 from vinl.chain.real_cameras import CameraErrors
 from vinl.chain.recorder import Recorder
 from vinl.chain.records import Episode
-from vinl.chain.robot import Robot, joint_targets
+from vinl.chain.robot import Robot, Robots
 from vinl.chain.scene import build_scene
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT
@@ -73,9 +73,9 @@ def run_episodes(
     """
     n, space = len(setups), FreeSpace(plan)
     locomotor, navigator = batch_policy(locomotor), batch_navigator(navigator)
-    locomotor.reset(n)
     navigator.reset([Task(space, setup.route) for setup in setups])
-    robots, faults = _spawn_robots(plan, setups, locomotor, config.faults), config.faults
+    robots = Robots(_spawn_robots(plan, setups, locomotor, config.faults))
+    faults = config.faults
     blocks = [setup.blocks for setup in setups]
     keys = [sensor_key(setup) for setup in setups]
     of_cameras, pitch = faults.add_to(config.sensors), math.radians(faults.camera_pitch)
@@ -90,10 +90,11 @@ def run_episodes(
     reckoning = None if config.odometry.is_exact else DeadReckoning(config.odometry, keys)
     goals = np.stack([setup.route.goal for setup in setups])
     recorders = [Recorder(setup, space, config, film=k in filmed) for k, setup in enumerate(setups)]
-    command, choice, actions = np.zeros((n, 3)), np.zeros((n, 2)), np.zeros((n, 12), np.float32)
+    command, choice = np.zeros((n, 3)), np.zeros((n, 2))
+    controller.reset(n)
     alive, done = list(range(n)), dict[int, Episode]()
     ask_only(alive, locomotor, navigator)
-    qpos, qvel = np.stack([w.qpos for w in robots]), np.stack([w.qvel for w in robots])
+    qpos, qvel = robots.qpos, robots.qvel
     limit = round(config.time_limit / CONTROL_DT)
     for step in range(limit):
         if sensors is not None:
@@ -112,11 +113,7 @@ def run_episodes(
             command[:, 0], command[:, 2] = choice[:, 0], choice[:, 1]
         for k in alive:
             recorders[k].note_pose(step, qpos[k], command[k])
-        actions = controller.act(*known, command, actions, alive)
-        targets = joint_targets(actions, locomotor.card)
-        for k in alive:
-            robots[k].step(targets[k])
-            qpos[k], qvel[k] = robots[k].qpos, robots[k].qvel
+        robots.step(controller.step(*known, command, alive), alive)
         errors = tracking_errors(qpos, qvel, command)
         away = np.linalg.norm(qpos[:, :2] - goals, axis=1)
         for k in list(alive):

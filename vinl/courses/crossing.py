@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vinl.chain.robot import joint_targets
 from vinl.courses.bars import BarConfig, draw_start
 from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.gait_metrics import GaitRecord, record_gait
@@ -113,18 +112,17 @@ def cross_bar(
         for number, start in zip(numbers, starts, strict=True)
     ]
     herd, controller = BoxHerd(ground.model, n), controller_on_course(policy, ground, n)
-    policy.reset(n)
+    controller.reset(n)
     for k, start in enumerate(starts):
         herd.start(k, start)
     limit = round(PATIENCE * (config.end - min(start.x for start in starts)) / config.speed / CONTROL_DT)
-    actions, alive = np.zeros((n, 12), np.float32), list(range(n))
+    alive = list(range(n))
     rows: list[tuple[np.ndarray, ...]] = []
     for step in range(limit):
         if step % 50 == 0 and is_stopped():
             break
-        actions = controller.act(herd.qpos, herd.qvel, steer(herd.qpos, config.speed), actions, alive)
         before = herd.qpos[:, :2].copy()
-        herd.step(joint_targets(actions, policy.card), alive)
+        herd.step(controller.step(herd.qpos, herd.qvel, steer(herd.qpos, config.speed), alive), alive)
         metres, touches = np.linalg.norm(herd.qpos[:, :2] - before, axis=1), herd.touches
         rows.append((herd.qpos.copy(), touches.feet.copy(), touches.legs.copy(), touches.trunk.copy()))
         record_gait([r.gait for r in records], herd.strain, herd.qpos, alive)

@@ -9,13 +9,11 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vinl.chain.robot import Robot
+from vinl.chain.config import MAX_TILT
+from vinl.chain.robot import Robot, Robots
 from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import Start
 from vinl.courses.strain import Strain, StrainReader
-
-MAX_TILT = 1.2566
-"""A trunk tilted farther than this has fallen [rad]: 72 deg."""
 
 
 @runtime_checkable
@@ -53,11 +51,12 @@ class BoxHerd:
     def __init__(self, model: mujoco.MjModel, n: int) -> None:
         self.touches, self._strain = BlockContacts.none(n), Strain.none(n)
         self.fallen = np.zeros(n, bool)
-        self.qpos, self.qvel = np.zeros((n, 19)), np.zeros((n, 18))
-        self._robots = [Robot(model) for _ in range(n)]
-        self._readers = [StrainReader(model, w.data, self.touches, self._strain, k) for k, w in enumerate(self._robots)]
-        for body, reader in zip(self._robots, self._readers, strict=True):
-            body.contacts = reader
+        each = [Robot(model) for _ in range(n)]
+        self._readers = [StrainReader(model, r.data, self.touches, self._strain, k) for k, r in enumerate(each)]
+        for robot, reader in zip(each, self._readers, strict=True):
+            robot.contacts = reader
+        self._robots = Robots(each)
+        self.qpos, self.qvel = self._robots.qpos, self._robots.qvel
 
     @property
     def strain(self) -> Strain:
@@ -67,17 +66,11 @@ class BoxHerd:
     def start(self, robot: int, start: Start) -> None:
         """Put a robot somewhere, at rest."""
         self._robots[robot].spawn(start.x, start.y, start.yaw, start.joints, start.ground)
-        self._read(robot)
+        self._robots.read(robot)
 
     def step(self, targets: Float[np.ndarray, "n 12"], rows: Sequence[int] | None = None) -> None:
         """One control step to joint targets [rad], of all robots or of those named; the others stay as they are."""
+        self._robots.step(targets, rows)
         for k in range(len(self._robots)) if rows is None else rows:
-            body = self._robots[k]
-            body.step(targets[k])
             self._readers[k].sum_up()
-            self.fallen[k] = body.has_fallen(MAX_TILT)
-            self._read(k)
-
-    def _read(self, robot: int) -> None:
-        body = self._robots[robot]
-        self.qpos[robot], self.qvel[robot] = body.qpos, body.qvel
+            self.fallen[k] = self._robots[k].has_fallen(MAX_TILT)

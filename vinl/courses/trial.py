@@ -9,7 +9,6 @@ from jaxtyping import Bool, Float
 
 from vinl.chain.controller import LocomotionController
 from vinl.chain.depth_cameras import DepthCameras
-from vinl.chain.robot import joint_targets
 from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import Course
 from vinl.courses.gait_metrics import record_gait
@@ -54,18 +53,17 @@ def run_trial(
     homes = np.array([ground.homes[course.home, :2] for course in courses])
     commands, fresh = np.stack([c.commands for c in courses], 1), np.stack([c.fresh for c in courses], 1)
     controller = controller_on_course(policy, ground, n)
-    policy.reset(n)
+    controller.reset(n)
     for k, course in enumerate(courses):
         herd.start(k, course.draw_start())
-    actions, age = np.zeros((n, 12), np.float32), np.zeros(n, int)
+    age = np.zeros(n, int)
     begun, counter, gaits = herd.qpos[:, :2].copy(), StepCounter(n), [record.gait for record in records]
     for step in range(len(commands)):
         if step % SETTLED == 0 and is_stopped():
             break
         age[fresh[step]] = 0
-        actions = controller.act(herd.qpos, herd.qvel, commands[step], actions)
         before = herd.qpos[:, :2].copy()
-        herd.step(joint_targets(actions, policy.card))
+        herd.step(controller.step(herd.qpos, herd.qvel, commands[step]))
         metres = np.linalg.norm(herd.qpos[:, :2] - before, axis=1)
         _add_errors(records, herd.qpos, herd.qvel, commands[step], age >= SETTLED)
         _add_touches(records, herd.touches, metres, herd.fallen)
@@ -80,9 +78,9 @@ def run_trial(
         away = fallen | (np.abs(herd.qpos[:, :2] - homes).max(1) > ground.reach)
         for k in np.flatnonzero(away).tolist():
             herd.start(k, courses[k].draw_start())
-            actions[k], age[k], begun[k] = 0, 0, herd.qpos[k, :2]
+            age[k], begun[k] = 0, herd.qpos[k, :2]
         if away.any():
-            policy.reset(away)
+            controller.reset(away)
             counter.restart(away, fallen)
     for k, record in enumerate(records):
         record.swings, record.dirty_swings = int(counter.steps[k]), int(counter.dirty[k])

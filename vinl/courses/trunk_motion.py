@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.chain.choose import check_locomotion_policy
+from vinl.chain.config import MAX_TILT
 from vinl.chain.controller import open_controller
-from vinl.chain.robot import Robot, joint_targets
+from vinl.chain.robot import Robot, Robots
 from vinl.chain.scene import build_scene
 from vinl.chain.workers import Context, WorkerPool
 from vinl.config.errors import InputError
@@ -28,8 +29,6 @@ GROUP = 16
 
 _HALF = 20.0
 """Half the side of the walled square that they walk in [m]."""
-
-_MAX_TILT = 1.2566
 
 _MODES = ((0.55, (0.6, 1.0), (0.0, 0.25)), (0.25, (0.3, 0.8), (0.2, 1.05)), (0.15, (0.0, 0.15), (0.5, 1.05)))
 """What a navigator asks for: share, forward speed [m/s] and size of the yaw rate [rad/s] of walking on, of walking a
@@ -117,13 +116,13 @@ def _record_group(context: Context, robots: range) -> list[MotionRecord]:
     blocks = scatter_blocks(plan, CLUTTER[clutter], scatter, starts[:, :2])
     kp, kd = (float(policy.card.action[key]) for key in ("kp", "kd"))
     model = build_scene(plan.boxes, blocks.boxes(), kp=kp, kd=kd)
-    bodies = [Robot(model) for _ in robots]
-    for body, (x, y, yaw), rng in zip(bodies, starts, rngs, strict=True):
+    each = [Robot(model) for _ in robots]
+    for body, (x, y, yaw), rng in zip(each, starts, rngs, strict=True):
         body.spawn(float(x), float(y), float(yaw), DEFAULT_POSE + rng.uniform(-0.05, 0.05, 12))
     controller = open_controller(policy, plan, [blocks] * n)
-    policy.reset(n)
-    command, actions = np.zeros((n, 3)), np.zeros((n, 12), np.float32)
-    qpos, qvel = np.stack([w.qpos for w in bodies]), np.stack([w.qvel for w in bodies])
+    controller.reset(n)
+    bodies, command = Robots(each), np.zeros((n, 3))
+    qpos, qvel = bodies.qpos, bodies.qvel
     history, length, fell = [], np.full(n, steps // PERIOD), np.zeros(n, bool)
     alive = list(range(n))
     for step in range(steps):
@@ -133,13 +132,10 @@ def _record_group(context: Context, robots: range) -> list[MotionRecord]:
             k = step // PERIOD
             history.append(_read_trunk(qpos))
             command[:, 0], command[:, 2] = orders[:, k].T
-        actions = controller.act(qpos, qvel, command, actions, alive)
-        targets = joint_targets(actions, policy.card)
+        bodies.step(controller.step(qpos, qvel, command, alive), alive)
         for k in list(alive):
-            bodies[k].step(targets[k])
-            qpos[k], qvel[k] = bodies[k].qpos, bodies[k].qvel
             out = np.abs(qpos[k, :2]).max() > _HALF - 1.5
-            if out or bodies[k].has_fallen(_MAX_TILT):
+            if out or bodies[k].has_fallen(MAX_TILT):
                 fell[k] = not out
                 length[k] = max(step // PERIOD - (0 if out else 2), 0)  # the tumble is no walking
                 alive.remove(k)

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from typing import Any
 
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.robot import ACTION_LIMIT
+from vinl.chain.controller import ACTION_LIMIT
 from vinl.export.frames import TRUNK, explain_rows
 from vinl.export.step import DEPTH, NEXT, Step
 from vinl.policies.card import PolicyCard

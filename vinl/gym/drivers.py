@@ -13,7 +13,6 @@ from vinl.chain.controller import open_controller
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.chain.navigators.base import Navigator, check_choice
 from vinl.chain.navigators.choose import load_navigator
-from vinl.chain.robot import joint_targets
 from vinl.gym.trip import Trip
 from vinl.policies.policy import Policy
 
@@ -31,14 +30,12 @@ class Legs:
 
     def enter(self, trip: Trip, ceiling: float | None) -> None:
         """A new episode begins."""
-        self._policy.reset(1)
-        self._observation = open_controller(self._policy, trip.task.space.plan, [trip.setup.blocks], ceiling)
-        self._last = np.zeros((1, 12), np.float32)
+        self._controller = open_controller(self._policy, trip.task.space.plan, [trip.setup.blocks], ceiling)
+        self._controller.reset(1)
 
     def choose(self, trip: Trip, command: Float[np.ndarray, "1 3"]) -> Float[np.ndarray, "12"]:
         """Joint targets [rad] of the next control step."""
-        self._last = self._observation.act(trip.qpos, trip.qvel, command, self._last, [0])
-        return joint_targets(self._last, self._policy.card)[0]
+        return self._controller.step(trip.qpos, trip.qvel, command, [0])[0]
 
 
 class Guide:

@@ -133,7 +133,7 @@ PROPRIOCEPTION_SIZE, SCAN_SIZE, OBSERVATION_SIZE = PROPRIOCEPTION.size, HEIGHT_S
 SCALE, NOISE = TABLE.scale, TABLE.noise
 
 
-def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, ground: Any) -> Any:
+def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, ground: Any = None) -> Any:
     """The observation of every robot, without noise.
 
     Args:
@@ -143,15 +143,16 @@ def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, g
             (MuJoCo's convention for a free joint).
         command: (n, 3) forward [m/s], left [m/s], yaw rate [rad/s].
         previous_action: (n, 12) the network's last output.
-        ground: (n, 187) height of the ground under ``SCAN_POINTS`` [m], as ``scan_ground`` reads it.
+        ground: (n, 187) height of the ground under ``SCAN_POINTS`` [m], as ``scan_ground`` reads it; None:
+            proprioception alone.
 
     Returns:
-        (n, 235) in the order of ``TABLE``.
+        (n, 235) in the order of ``TABLE``, or (n, 48) in that of ``PROPRIOCEPTION``.
 
     Raises:
         ValueError: another number of points.
     """
-    if ground.shape[-1] != SCAN_SIZE:
+    if ground is not None and ground.shape[-1] != SCAN_SIZE:
         raise ValueError(f"the height scan has {SCAN_SIZE} points, got {ground.shape[-1]}")
     quaternion = qpos[:, 3:7]
     down = xp.broadcast_to(xp.asarray([0.0, 0.0, -1.0], dtype=qpos.dtype), qpos[:, :3].shape)
@@ -163,6 +164,8 @@ def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, g
         qpos[:, 7:] - xp.asarray(DEFAULT_POSE, dtype=qpos.dtype),
         qvel[:, 6:],
         previous_action,
-        xp.clip(qpos[:, 2:3] - SCAN_OFFSET - ground, -1.0, 1.0),
     ]
-    return xp.clip(xp.concatenate(parts, -1) * xp.asarray(SCALE, dtype=qpos.dtype), -CLIP, CLIP)
+    if ground is not None:
+        parts.append(xp.clip(qpos[:, 2:3] - SCAN_OFFSET - ground, -1.0, 1.0))
+    scale = PROPRIOCEPTION.scale if ground is None else SCALE
+    return xp.clip(xp.concatenate(parts, -1) * xp.asarray(scale, dtype=qpos.dtype), -CLIP, CLIP)

@@ -17,7 +17,7 @@ from vinl.chain.controller import open_controller
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.chain.navigators.base import Navigator, Task, check_choice
 from vinl.chain.navigators.choose import load_navigator
-from vinl.chain.robot import Robot, joint_targets
+from vinl.chain.robot import Robot
 from vinl.chain.rollout import goal_in_heading_frame
 from vinl.chain.scene import FORCE_SENSORS, build_scene
 from vinl.config.errors import InputError
@@ -143,8 +143,7 @@ class LiveChain:
             self._decide(self._goal)
         self._since_goal += 1
         qpos, qvel = self._walker.qpos[None].copy(), self._walker.qvel[None].copy()
-        self._actions = self._senses.act(qpos, qvel, self._command, self._actions)
-        self._walker.step(joint_targets(self._actions, self._locomotion.card)[0])
+        self._walker.step(self._controller.step(qpos, qvel, self._command)[0])
         self._count()
         if self._walker.has_fallen(self._config.max_tilt):
             self._state, self._goal = "fallen", None
@@ -218,8 +217,7 @@ class LiveChain:
         self._home = pose
         x, y, yaw = pose.tolist()
         self._walker.spawn(x, y, yaw, self.world.joints)
-        self._locomotion.reset(1)
-        self._actions = np.zeros((1, 12), np.float32)
+        self._controller.reset(1)
         self._steps, self._distance, self._at = 0, 0.0, self._xy
         self._path: list[np.ndarray] = [self._xy]
         self._contacts: deque[tuple[float, int, float, float, float]] = deque()
@@ -290,7 +288,7 @@ class LiveChain:
         kp, kd = (float(self._locomotion.card.action[key]) for key in ("kp", "kd"))
         model = build_scene(world.plan.boxes, world.blocks.boxes(), kp=kp, kd=kd)
         self._walker = Robot(model)
-        self._senses = open_controller(self._locomotion, world.plan, [world.blocks], self._config.ceiling)
+        self._controller = open_controller(self._locomotion, world.plan, [world.blocks], self._config.ceiling)
         self._cameras: dict[str, DepthCameras] = {
             name: open_depth_cameras(world.plan, [world.blocks], camera, self._config.ceiling)
             for name, camera in self._choose_cameras().items()
@@ -303,7 +301,9 @@ class LiveChain:
     def _rebuild(self, world: World) -> None:
         """The world changes under the walking robot: its motion goes on."""
         before: Any = self._walker.data
+        actions = self._controller.actions
         self._build(world)
+        self._controller.actions = actions
         now: Any = self._walker.data
         for name in ("qpos", "qvel", "ctrl", "qacc_warmstart"):
             getattr(now, name)[:] = getattr(before, name)
@@ -335,16 +335,15 @@ class LiveChain:
         check_cameras(legs, guide)
         goal, self._goal = self._goal, None
         self._locomotion, self._navigator = legs, guide
-        legs.reset(1)
-        self._actions = np.zeros((1, 12), np.float32)
         self._rebuild(self.world)
+        self._controller.reset(1)
         if goal is not None:
             self._go_to(goal)
 
     def _read_footholds(self) -> Footholds:
         """What the policies tell of their footholds, in the world frame."""
         found: dict[str, np.ndarray] = {}
-        for one in (self._senses, self._locomotion):
+        for one in (self._controller, self._locomotion):
             if isinstance(one, TellsFootholds):
                 found.update({name: self._in_world(points[0]) for name, points in one.footholds().items()})
         return Footholds(found.get("planned"), found.get("predicted"))
