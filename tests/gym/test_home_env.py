@@ -13,9 +13,9 @@ from gymnasium.utils.env_checker import check_env
 
 import vinl
 import vinl.gym
+from vinl.chain import controller
 from vinl.chain.batching import batch_policy
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.controller import LocomotionController
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.chain.records import plain_record
 from vinl.config.errors import InputError
@@ -123,8 +123,8 @@ def test_joints_walk_the_episode_that_evaluate_walks(monkeypatch: pytest.MonkeyP
     legs = batch_policy(policy)
     legs.reset(1)
     asked = []
-    plain = LocomotionController.act
-    monkeypatch.setattr(LocomotionController, "act", lambda *args: asked.append(plain(*args)) or asked[-1])
+    plain = controller.check_actions
+    monkeypatch.setattr(controller, "check_actions", lambda *args: asked.append(plain(*args)) or asked[-1])
     plan = vinl.load_floorplan(PLAN)
     record = vinl.evaluate([plan], policy, "oracle", 1, 1, obstacles="none", config=rules).records[0]
     env = HomeEnv(
