@@ -37,7 +37,7 @@ class GlidingHerd(BoxHerd):
             mujoco.mj_forward(body.model, body.data)
             reader.look()
             reader.sum_up()
-            self._read(k)
+            self._robots.read(k)
 
 
 def glide(policy: LocomotionPolicy, monkeypatch: pytest.MonkeyPatch, lift: float, height: float = 0.1):
