@@ -35,7 +35,7 @@ class PacingHerd(BoxHerd):
             body.contacts.look()
             self._readers[k].sum_up()
             self.fallen[k] = False
-            self._read(k)
+            self._robots.read(k)
 
 
 def test_objects_are_small_low_and_as_many_as_asked_for() -> None:
