@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
@@ -23,6 +24,7 @@ FLAGS = [
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
+    "--disable-dev-shm-usage",
     "--enable-unsafe-swiftshader",
     "--use-angle=swiftshader",
 ]
@@ -68,13 +70,12 @@ def served(*options: str) -> Iterator[str]:
 @contextmanager
 def opened(browser: Browser, url: str) -> Iterator[Page]:
     """The page, which must not have complained in the end."""
-    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page = browser.new_page(viewport={"width": 1000, "height": 600})
     page.set_default_timeout(PATIENCE)
     complaints: list[str] = []
     page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.goto(url)
-    page.wait_for_selector("#vinl-state")
     yield page
     assert complaints == []
     page.close()
@@ -101,6 +102,7 @@ const images = () => [...document.images].map(image => image.src).join();
 def test_robot_walks_to_a_clicked_goal_and_is_driven_by_keys(browser: Browser):
     options = "--plan harbour_flat --loco loco --nav oracle --obstacles none"
     with served(*options.split()) as url, opened(browser, url) as page:
+        page.wait_for_selector("#vinl-state")
         assert page.inner_text("#vinl-state") == "standing" and "click the floor" in page.inner_text("#vinl-goal")
         page.evaluate(f"() => {{ {_TEXT} window.before = images(); }}")
         canvas = page.locator("canvas").first.bounding_box()
@@ -132,6 +134,7 @@ def test_robot_walks_to_a_clicked_goal_and_is_driven_by_keys(browser: Browser):
 
 def test_block_is_dropped_by_a_click_and_clutter_drawn_by_a_button(browser: Browser):
     with served("--terrain", "flat", "--policy", "rough") as url, opened(browser, url) as page:
+        page.wait_for_selector("#vinl-state")
         assert number(page, "blocks") == 0
         canvas = page.locator("canvas").first.bounding_box()
         assert canvas is not None
@@ -141,3 +144,32 @@ def test_block_is_dropped_by_a_click_and_clutter_drawn_by_a_button(browser: Brow
         until(page, 'value("blocks") === 1')
         page.get_by_text("Clear", exact=True).click()
         until(page, 'value("blocks") === 0')
+
+
+def test_recording_is_scrubbed_by_its_slider(browser: Browser, folder: Path):
+    with served("--replay", str(folder), "--episode", "1") as url, opened(browser, url) as page:
+        page.wait_for_selector("#vinl-state")
+        assert page.inner_text("#vinl-state") == "recorded, paused" and number(page, "time") == 0
+        place = page.inner_text("#vinl-place")
+        time = page.locator("input[inputmode=decimal]").first  # beside the slider
+        time.fill("0.8")
+        time.press("Enter")
+        until(page, 'value("time") === 0.8')
+        assert page.inner_text("#vinl-place") != place
+
+
+def test_report_shows_where_the_robots_were_at_a_time(browser: Browser, folder: Path):
+    with opened(browser, (folder / "report.html").as_uri()) as page:
+        slider, map_ = page.locator(".clock input").first, page.locator(".map").first
+        robots = map_.locator(".robot")
+        assert "timed" not in str(map_.get_attribute("class"))
+        slider.fill("0.5")
+        assert page.locator(".clock output").first.inner_text() == "0.5 s"
+        assert robots.count() == 2 and "timed" in str(map_.get_attribute("class"))
+        halfway = [robots.nth(k).get_attribute("cx") for k in range(2)]
+        slider.fill("0")
+        assert [robots.nth(k).get_attribute("cx") for k in range(2)] != halfway
+        page.locator(".clock button").first.click()
+        page.wait_for_function(
+            "() => !document.querySelector('.map').classList.contains('timed')"
+        )  # it played to its end

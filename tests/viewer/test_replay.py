@@ -13,35 +13,6 @@ from vinl.viewer.replay import Replay
 from vinl.viewer.requests import OpenEpisode, Seek, SetGoal
 from vinl.viewer.session import Session
 
-COMMAND = [
-    "eval",
-    "--floorplans",
-    "harbour_flat",
-    "--loco",
-    "rough",
-    "--nav",
-    "oracle",
-    "--obstacles",
-    "paper",
-    "--episodes",
-    "2",
-    "--seeds",
-    "1",
-    "--workers",
-    "1",
-    "--record",
-    "--set",
-    "time_limit=1.2",
-    "--out",
-]
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("recorded")
-    assert main([*COMMAND, str(out)]) == 0
-    return out
-
 
 def test_recordings_are_small_and_hold_the_poses_of_the_walk(folder: Path):
     files = sorted((folder / RECORDINGS).iterdir())
@@ -57,12 +28,12 @@ def test_recordings_are_small_and_hold_the_poses_of_the_walk(folder: Path):
     np.testing.assert_allclose(episode.trace.commands, walk.trace.commands, atol=1e-3)
 
 
-def test_same_command_walks_only_what_has_no_recording(folder: Path, capsys: pytest.CaptureFixture[str]):
+def test_same_command_walks_only_what_has_no_recording(folder: Path, record_command: list[str]):
     path = find_recording(folder, ("harbour_flat", 0, 1))
     kept, other = path.read_bytes(), find_recording(folder, ("harbour_flat", 0, 0))
     path.unlink()
     before = other.stat().st_mtime_ns
-    assert main([*COMMAND, str(folder)]) == 0
+    assert main([*record_command, str(folder)]) == 0
     assert path.read_bytes() == kept and other.stat().st_mtime_ns == before
 
 
@@ -91,13 +62,13 @@ def test_recording_plays_and_goes_to_any_time(folder: Path):
     assert "this is a recording" in session.advance(0).notice[1]
 
 
-def test_folder_without_recordings_says_how_to_make_them(folder: Path, tmp_path: Path):
+def test_folder_without_recordings_says_how_to_make_them(folder: Path, record_command: list[str], tmp_path: Path):
     with pytest.raises(InputError, match="vinl eval --record wrote"):
         Recordings(tmp_path / "nowhere")
     with pytest.raises(InputError, match=r"run\.json is missing"):
         Recordings(tmp_path)
     bare = tmp_path / "bare"
-    assert main([*[word for word in COMMAND if word != "--record"], str(bare)]) == 0
+    assert main([*[word for word in record_command if word != "--record"], str(bare)]) == 0
     with pytest.raises(InputError, match="no recordings; walk it again with vinl eval --record"):
         Recordings(bare)
     with pytest.raises(InputError, match="episodes 0 to 1"):

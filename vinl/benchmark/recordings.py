@@ -45,6 +45,7 @@ def write_recording(folder: Path, episode: Episode) -> Path:
         with os.fdopen(handle, "wb") as file:
             arrays: dict[str, Any] = {name: part.astype(kinds[name]) for name, part in parts.items()}
             np.savez_compressed(file, **arrays)
+        Path(scratch).chmod(0o644)
         Path(scratch).replace(path)
     except BaseException:
         Path(scratch).unlink(missing_ok=True)

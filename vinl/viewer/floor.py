@@ -36,8 +36,7 @@ def inside_mesh(plan: FloorPlan) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarr
     Returns:
         vertices (v, 3) float32 [m] and faces (f, 3).
     """
-    rectangles = cover_cells(plan.inside)
-    half = plan.frame.resolution / 2
+    rectangles, half = cover_cells(plan.inside), plan.frame.resolution / 2
     low, high = plan.frame.xy(rectangles[:, :2]) - half, plan.frame.xy(rectangles[:, 2:]) - half
     corners = np.stack([low, np.stack([high[:, 0], low[:, 1]], 1), high, np.stack([low[:, 0], high[:, 1]], 1)], 1)
     vertices = np.concatenate([corners, np.zeros((len(corners), 4, 1))], 2).reshape(-1, 3)

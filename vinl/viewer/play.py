@@ -141,7 +141,7 @@ def replay(
     from vinl.viewer.viewer import Viewer
 
     shelf = Recordings(Path(folder))
-    session = Session(Replay(shelf, episode), pace)
+    session = Session(Replay(shelf, episode), pace, paused=True)
     viewer = Viewer(session, "vinl play: recording", host, port)
     viewer.add_replay_controls(shelf.labels, episode)
     session.start()

@@ -83,8 +83,8 @@ class Replay:
         return ""
 
     def step(self) -> bool:
-        """The next pose; whether it was the last."""
-        self._frame = min(self._frame + 1, len(self._poses) - 1)
+        """The next pose, after the last one the first; whether it is the last."""
+        self._frame = (self._frame + 1) % len(self._poses)
         return self._frame == len(self._poses) - 1
 
     def snapshot(self, look: bool) -> Snapshot:

@@ -170,7 +170,7 @@ class SceneView:
         self.follows = False
         if self._plan is not None:
             cells = np.argwhere(self._plan.inside)
-            middle = self._plan.frame.xy((cells.min(0) + cells.max(0)) / 2)
+            middle = self._plan.frame.xy(np.stack([cells.min(0), cells.max(0)])).mean(0)
             self._centre = middle
             self._root.position = (-middle[0], -middle[1], 0.0)
 

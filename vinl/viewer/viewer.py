@@ -47,6 +47,7 @@ class Viewer:
 
     Attributes:
         session: what is shown.
+        error: what ended the drawing, if anything did.
         url: where to look.
 
     Raises:
@@ -55,6 +56,7 @@ class Viewer:
 
     def __init__(self, session: Session, title: str, host: str = "127.0.0.1", port: int = 8080) -> None:
         self.session, self._closing = session, threading.Event()
+        self.error: BaseException | None = None
         self._server = open_server(host, port, title)
         shown = "localhost" if host in ("0.0.0.0", "127.0.0.1") else host
         self.url = f"http://{shown}:{self._server.get_port()}"
@@ -112,14 +114,16 @@ class Viewer:
             self._server.stop()
 
     def wait(self) -> None:
-        """Until the session fails.
+        """Until the session or the drawing fails.
 
         Raises:
-            BaseException: what the session failed with.
+            BaseException: what it failed with.
         """
-        while self.session.error is None:
+        while True:
+            error = self.session.error or self.error
+            if error is not None:
+                raise error
             time.sleep(0.2)
-        raise self.session.error
 
     def _repr_html_(self) -> str:
         """In a notebook: the page in a frame."""
@@ -147,7 +151,7 @@ class Viewer:
             place: tuple[float, float, float] = _CAMERA
         else:
             self.scene.centre_plan()
-            place = (0.0, -0.35 * self.scene.extent, 0.85 * self.scene.extent)
+            place = (0.0, -0.35 * self.scene.extent, 1.05 * self.scene.extent)
         if client is not None:
             with client.atomic():
                 client.camera.position, client.camera.look_at = place, (0.0, 0.0, 0.0)
@@ -155,6 +159,12 @@ class Viewer:
     # ---- what they see ---------------------------------------------------------------------------------------------
 
     def _run(self) -> None:
+        try:
+            self._draw()
+        except Exception as error:  # whoever waits is told
+            self.error = error
+
+    def _draw(self) -> None:
         shown: Snapshot | None = None
         told, noticed = 0.0, self.session.snapshot.notice[0]
         while not self._closing.is_set():

@@ -1,0 +1,74 @@
+"""The page without a browser: what is drawn of every kind of snapshot, and where clicks meet the floor."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import vinl
+from vinl.viewer.floor import cover_cells, inside_mesh
+from vinl.viewer.panel_text import render_status
+from vinl.viewer.requests import Drive, OpenPlan, ScatterClutter, SetGoal, ToggleBlock
+from vinl.viewer.scene_view import LAYERS
+from vinl.viewer.viewer import Viewer
+
+
+def wait_until_drawn(viewer: Viewer) -> None:
+    """Until the latest snapshot can be expected to be on the page."""
+    time.sleep(0.5)
+    assert viewer.error is None and viewer.session.error is None
+
+
+@pytest.fixture
+def viewer() -> Viewer:
+    return vinl.play("harbour_flat", "rough", "oracle", obstacles="none", seed=1)
+
+
+def test_everything_is_drawn(viewer: Viewer):
+    x, y = viewer.session.snapshot.qpos[:2]
+    for request in (SetGoal(x + 1.0, y), ScatterClutter("paper"), ToggleBlock(x + 0.8, y), Drive(0.3, 0.2)):
+        viewer.session.ask(request)
+        wait_until_drawn(viewer)
+    for layer in LAYERS:
+        viewer.scene.show(layer, False)
+        viewer.scene.show(layer, True)
+    wait_until_drawn(viewer)
+    viewer.session.ask(OpenPlan("mill_loft"))
+    time.sleep(1.0)
+    wait_until_drawn(viewer)
+    assert viewer.session.snapshot.world.plan.name == "mill_loft"
+    assert f'src="{viewer.url}"' in viewer._repr_html_()
+    viewer.close()
+
+
+def test_points_of_the_scene_are_points_of_the_plan(viewer: Viewer):
+    wait_until_drawn(viewer)
+    robot = viewer.session.snapshot.qpos
+    np.testing.assert_allclose(viewer.scene.to_world(np.zeros(3))[:2], robot[:2], atol=0.05)  # it follows the robot
+    viewer.scene.centre_plan()
+    cells = np.argwhere(viewer.session.snapshot.world.plan.inside)
+    frame = viewer.session.snapshot.world.plan.frame
+    middle = (frame.xy(cells.min(0)) + frame.xy(cells.max(0))) / 2
+    np.testing.assert_allclose(viewer.scene.to_world(np.zeros(3))[:2], middle)
+    viewer.close()
+
+
+def test_recording_is_drawn(folder: Path):
+    viewer = vinl.replay(folder, 1)
+    wait_until_drawn(viewer)
+    assert viewer.session.snapshot.paused and "of 1.2 s" in render_status(viewer.session.snapshot)
+    viewer.close()
+
+
+def test_floor_covers_the_inside_once():
+    plan = vinl.load_floorplan("harbour_flat")
+    count = np.zeros(plan.inside.shape, int)
+    for a, b, c, d in cover_cells(plan.inside):
+        count[a:c, b:d] += 1
+    np.testing.assert_array_equal(count, plan.inside)
+    vertices, faces = inside_mesh(plan)
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    area = np.cross(b - a, c - a)[:, 2] / 2
+    assert area.min() > 0  # seen from above
+    assert area.sum() == pytest.approx(plan.inside.sum() * plan.frame.resolution**2, rel=1e-4)
