@@ -96,8 +96,9 @@ def train_navigator(
         torch.set_num_threads(min(torch.get_num_threads(), _HOST_THREADS))
         torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = torch.backends.cudnn.benchmark = True
         if memory is not None:
-            total = torch.cuda.get_device_properties(device).total_memory
-            torch.cuda.set_per_process_memory_fraction(min(memory * 1e9 / total, 1.0), device)
+            index = torch.device(device).index or 0
+            total = torch.cuda.get_device_properties(index).total_memory
+            torch.cuda.set_per_process_memory_fraction(min(memory * 1e9 / total, 1.0), index)
     torch.manual_seed(config.seed + peers.rank)
     own = separate(config, peers.rank, peers.count)
     environment = build_environment(own, device, peers)
