@@ -60,7 +60,7 @@ def test_a_home_of_closets_is_refused(two_rooms: FloorPlan, standing: Locomotion
         ((0.02, 3.0), (2.0, 5.0), "start .* lies inside a wall"),
         ((2.0, 5.0), (50.0, 5.0), "goal .* outside the floor plan"),
         ((2.0, 5.0), (0.2, 5.0), "goal .* is 0.1. m from a wall or furniture, the robot needs 0.22 m"),
-        ((2.0, 5.0), (7.0, 5.0), r"no way leads from \(2.00, 5.00\) to \(7.00, 5.00\): they lie in rooms without"),
+        ((2.0, 5.0), (7.0, 5.0), r"no path leads from \(2.00, 5.00\) to \(7.00, 5.00\): they lie in rooms without"),
     ],
 )
 def test_routes_that_cannot_be_walked(cells: FloorPlan, start: tuple, goal: tuple, words: str) -> None:

@@ -9,11 +9,12 @@ import numpy as np
 
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.policies.card import find_detour
+from vinl.gait.observation import SENSED_TABLE
+from vinl.policies.card import find_detour, find_gait, locomotion_table
 from vinl.policies.io import list_policies, load_policy
 from vinl.policies.policy import Policy
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
-from vinl.robot.observation import OBSERVATION_SIZE, PROPRIOCEPTION_SIZE
+from vinl.robot.observation import PROPRIOCEPTION_SIZE
 
 BEST_FIRST = ("loco", "teacher", "rough")
 """Shipped locomotors, the one that is wanted most first."""
@@ -83,16 +84,18 @@ def check_locomotion_policy(policy: Policy) -> None:
     """Refuse a policy that is no locomotor, or observes what there is not.
 
     Raises:
-        InputError: it is of another kind, its table is neither one with a height scan nor proprioception alone, or its
-            commands are bent as they cannot be.
+        InputError: it is of another kind, its table is none that the robot has, or its commands are bent as they
+            cannot be.
     """
     card = policy.card
     if card.kind != "locomotion":
         raise InputError(f"{card.name} is a {card.kind} policy; a locomotor (--loco, --policy) is a locomotion policy")
-    if card.observation_size not in (PROPRIOCEPTION_SIZE, OBSERVATION_SIZE):
+    gait = find_gait(card) is not None
+    plain, scanned = (locomotion_table(scan, gait).size for scan in (False, True))
+    if card.observation_size not in (SENSED_TABLE.size, plain, scanned):
         raise InputError(
-            f"policy {card.name} observes {card.observation_size} numbers; the robot has {PROPRIOCEPTION_SIZE}, or "
-            f"{OBSERVATION_SIZE} with the height scan"
+            f"policy {card.name} observes {card.observation_size} numbers; the robot has {plain}, or {scanned} "
+            "with the height scan"
         )
     if find_detour(card) is not None and card.observation_size == PROPRIOCEPTION_SIZE:
         raise InputError(f"policy {card.name}: commands are bent only for one that observes the height scan")

@@ -8,13 +8,15 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
+from vinl.chain.gait_reader import GaitReader, map_plan
 from vinl.chain.ground_map import GroundMap
 from vinl.chain.real_cameras import CameraErrors, RealCameras
 from vinl.config.errors import InputError
-from vinl.policies.card import PolicyCard, find_detour, reads_ground
+from vinl.gait.observation import SENSED_TABLE, insert_gait
+from vinl.policies.card import PolicyCard, find_detour, find_gait, reads_ground
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import DEFAULT_POSE
-from vinl.robot.observation import observe
+from vinl.robot.observation import PROPRIOCEPTION_SIZE, observe
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
 
@@ -25,22 +27,31 @@ ACTION_LIMIT = 100.0
 class LocomotionController:
     """One control step of a locomotion policy for n robots: observe, act, joint targets. Remembers the last actions.
 
-    A policy of 48 numbers gets only proprioception, one of 235 the height scan too; one with a camera gets
-    depth.
+    A policy gets what its card lists: proprioception, with or without the velocity of the trunk, the rows of a gait
+    that is planned on the map, the height scan; one with a camera gets depth.
 
     Args:
         policy: the locomotion policy.
         scan: reads the height scan that the policy observes, and bends its commands if it was trained so; None: it
             observes none.
         cameras: renders depth; needed only by a policy with a camera.
+        gait: plans the gait whose rows the policy observes; None: it observes none.
 
     Attributes:
         policy: as given.
         actions: (n, 12) the last ones; none before the first ``reset``.
     """
 
-    def __init__(self, policy: Policy, scan: GroundMap | None, cameras: DepthCameras | RealCameras | None) -> None:
-        self.policy, self._scan, self._cameras = policy, scan, cameras
+    def __init__(
+        self,
+        policy: Policy,
+        scan: GroundMap | None,
+        cameras: DepthCameras | RealCameras | None,
+        gait: GaitReader | None = None,
+    ) -> None:
+        self.policy, self._scan, self._cameras, self._gait = policy, scan, cameras, gait
+        sensed = policy.card.observation_size == SENSED_TABLE.size
+        self._first = PROPRIOCEPTION_SIZE - SENSED_TABLE.size if sensed else 0
         self.actions = np.zeros((0, 12), np.float32)
 
     def reset(self, which: int | Bool[np.ndarray, " n"]) -> None:
@@ -50,6 +61,8 @@ class LocomotionController:
             self.actions = np.zeros((which, 12), np.float32)
         else:
             self.actions[which] = 0
+        if self._gait is not None:
+            self._gait.reset(np.ones(which, bool) if isinstance(which, int) else which)
 
     def step(
         self,
@@ -71,7 +84,9 @@ class LocomotionController:
         ground = None
         if self._scan is not None:
             ground, command = self._scan.read(qpos), self._scan.bend(qpos, command)
-        observation = observe(np, qpos, qvel, command, self.actions, ground)
+        observation = observe(np, qpos, qvel, command, self.actions, ground)[:, self._first :]
+        if self._gait is not None:
+            observation = insert_gait(np, observation, self._gait.read(qpos, qvel, command))
         if self._cameras is None:
             answer = self.policy.act(observation)
         else:
@@ -94,8 +109,10 @@ def open_controller(
     """
     scan = GroundMap(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
     cameras = None if locomotor.camera is None else open_depth_cameras(plan, blocks, locomotor.camera, ceiling, pitch)
+    config = find_gait(locomotor.card)
+    gait = None if config is None else GaitReader(config, map_plan(plan, blocks))
     return LocomotionController(
-        locomotor, scan, cameras if cameras is None or errors is None else errors.put_on(cameras)
+        locomotor, scan, cameras if cameras is None or errors is None else errors.put_on(cameras), gait
     )
 
 

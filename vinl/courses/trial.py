@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float
 
 from vinl.chain.controller import LocomotionController
 from vinl.chain.depth_cameras import DepthCameras
+from vinl.chain.gait_reader import GaitReader, map_ground
 from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import Course
 from vinl.courses.gait_metrics import record_gait
@@ -16,9 +17,10 @@ from vinl.courses.grounds import FieldMap, Ground
 from vinl.courses.herd import Herd
 from vinl.courses.robot_records import FRONT, REAR, RobotRecord
 from vinl.courses.step_counter import StepCounter
-from vinl.policies.card import find_detour, reads_ground
+from vinl.policies.card import find_detour, find_gait, reads_ground
 from vinl.policies.policy import Policy
 from vinl.robot.rotation import rotate_inverse
+from vinl.world.heightfield import WALL
 
 LEAD = 0.5
 """Steps count from so far from the last start on [m]: all feet then come to ground that the robot has seen."""
@@ -92,7 +94,12 @@ def controller_on_course(policy: Policy, ground: Ground, n: int) -> LocomotionCo
     """What a policy of n robots observes on a ground that all of them walk on."""
     scan = FieldMap(ground.field, find_detour(policy.card)) if reads_ground(policy.card) else None
     cameras = None if policy.camera is None else DepthCameras([ground.mesh()], [0] * n, policy.camera)
-    return LocomotionController(policy, scan, cameras)
+    config = find_gait(policy.card)
+    gait = None
+    if config is not None:
+        bare = np.where(ground.field.labels == WALL, 0.0, ground.field.heights).astype(np.float32)
+        gait = GaitReader(config, map_ground(bare, ground.field.frame, ground.blocks.boxes() + ground.walls))
+    return LocomotionController(policy, scan, cameras, gait)
 
 
 def _new_record(ground: Ground, course: Course) -> RobotRecord:
