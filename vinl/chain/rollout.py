@@ -16,7 +16,7 @@ from vinl.chain.depth_cameras import open_depth_cameras
 from vinl.chain.episode import EpisodeSetup, draw_faults, sensor_key
 from vinl.chain.fault_config import FaultConfig
 from vinl.chain.faults import FaultyState, change_body
-from vinl.chain.navigators.base import Navigator, Task, check_choice
+from vinl.chain.navigators.base import Navigator, Task, decide
 from vinl.chain.real_cameras import CameraErrors
 from vinl.chain.recorder import Recorder
 from vinl.chain.records import Episode
@@ -31,13 +31,6 @@ from vinl.world.free_space import FreeSpace
 
 class InterruptedRunError(Exception):
     """The roll-out was asked to stop."""
-
-
-def goal_in_heading_frame(pose: Float[np.ndarray, "n 3"], goal: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
-    """Straight distance to the goal [m], cosine and sine of its bearing, left positive [ViNL code]."""
-    to = goal - pose[:, :2]
-    bearing = np.arctan2(to[:, 1], to[:, 0]) - pose[:, 2]
-    return np.stack([np.linalg.norm(to, axis=1), np.cos(bearing), np.sin(bearing)], 1)
 
 
 def run_episodes(
@@ -105,11 +98,8 @@ def run_episodes(
                 raise InterruptedRunError
             pose = np.column_stack([qpos[:, :2], yaw_of(np, qpos[:, 3:7])])
             believed = pose if reckoning is None else reckoning.follow(pose)
-            seen = {"goal": goal_in_heading_frame(believed, goals), "previous_action": choice, "pose": believed}
-            seen["true_pose"] = pose
-            if cameras is not None:
-                seen["depth"] = cameras.look(qpos, alive)
-            choice = check_choice(navigator.act(seen), n, navigator)
+            depth = None if cameras is None else cameras.look(qpos, alive)
+            choice = decide(navigator, goals, choice, pose, believed, depth)
             command[:, 0], command[:, 2] = choice[:, 0], choice[:, 1]
         for k in alive:
             recorders[k].note_pose(step, qpos[k], command[k])

@@ -11,7 +11,7 @@ from vinl.chain.batching import batch_navigator, batch_policy
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.controller import open_controller
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
-from vinl.chain.navigators.base import Navigator, check_choice
+from vinl.chain.navigators.base import Navigator, decide
 from vinl.chain.navigators.choose import load_navigator
 from vinl.gym.trip import Trip
 from vinl.policies.policy import Policy
@@ -56,8 +56,6 @@ class Guide:
 
     def choose(self, trip: Trip) -> Float[np.ndarray, "2"]:
         """Forward speed [m/s] and yaw rate [rad/s] of the next half second."""
-        seen = {"goal": trip.goal, "previous_action": self._last, "pose": trip.pose}
-        if self._cameras is not None:
-            seen["depth"] = self._cameras.look(trip.qpos, [0])
-        self._last = check_choice(self._navigator.act(seen), 1, self._navigator)
+        depth = None if self._cameras is None else self._cameras.look(trip.qpos, [0])
+        self._last = decide(self._navigator, trip.setup.route.goal[None], self._last, trip.pose, depth=depth)
         return self._last[0]

@@ -8,11 +8,11 @@ from jaxtyping import Float
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.contacts import KINDS
 from vinl.chain.episode import EpisodeSetup
-from vinl.chain.navigators.base import Task
+from vinl.chain.navigators.base import Task, goal_in_heading_frame
 from vinl.chain.recorder import Recorder
 from vinl.chain.records import Episode
 from vinl.chain.robot import Robot
-from vinl.chain.rollout import goal_in_heading_frame, tracking_errors
+from vinl.chain.rollout import tracking_errors
 from vinl.chain.scene import build_scene
 from vinl.robot.aliengo import CONTROL_DT, KD, KP
 from vinl.robot.rotation import yaw_of
@@ -50,7 +50,7 @@ class Trip:
         self.task, self.setup, self._rules = Task(space, setup.route), setup, rules
         self.robot = Robot(build_scene(space.plan.boxes, setup.blocks.boxes(), kp=kp, kd=kd))
         self.robot.spawn(float(setup.route.start[0]), float(setup.route.start[1]), setup.yaw, setup.joints)
-        self._tally = Recorder(setup, space, rules, film=False)
+        self._recorder = Recorder(setup, space, rules, film=False)
         self._field = distance_field(space.traversable, space.plan.frame, setup.route.goal)
         self._limit = round(rules.time_limit / CONTROL_DT)
         self.steps, self.foot_steps, self.touched_wall, self.end = 0, 0, False, ""
@@ -91,10 +91,10 @@ class Trip:
             target: of the joints.
             command: velocities that the robot was to have, for the errors in the record.
         """
-        self._tally.note_pose(self.steps, self.robot.qpos, command[0])
+        self._recorder.note_pose(self.steps, self.robot.qpos, command[0])
         self.robot.step(target)
         self.steps += 1
-        self._tally.count(self.steps, self.robot, tracking_errors(self.qpos, self.qvel, command)[0])
+        self._recorder.count(self.steps, self.robot, tracking_errors(self.qpos, self.qvel, command)[0])
         touched = self.robot.contacts.touches.keys()
         self.foot_steps += bool(_FEET & touched)
         self.touched_wall = bool(_WALLS & touched)
@@ -103,13 +103,13 @@ class Trip:
         elif self.robot.has_fallen(self._rules.max_tilt):
             self._end("fall")
         elif self.steps == self._limit:
-            self._tally.end_of_time()
+            self._recorder.end_of_time()
             self._end(self.close().record.end_reason)
 
     def close(self) -> Episode:
         """Record and trace of the episode."""
-        return self._tally.close()
+        return self._recorder.close()
 
     def _end(self, reason: str) -> None:
         self.end = reason
-        self._tally.end(reason)
+        self._recorder.end(reason)

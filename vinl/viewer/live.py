@@ -15,10 +15,9 @@ from vinl.chain.config import EvaluationConfig
 from vinl.chain.contacts import KINDS
 from vinl.chain.controller import open_controller
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
-from vinl.chain.navigators.base import Navigator, Task, check_choice
+from vinl.chain.navigators.base import Navigator, Task, decide
 from vinl.chain.navigators.choose import load_navigator
 from vinl.chain.robot import Robot
-from vinl.chain.rollout import goal_in_heading_frame
 from vinl.chain.scene import FORCE_SENSORS, build_scene
 from vinl.config.errors import InputError
 from vinl.policies.policy import Policy
@@ -263,15 +262,8 @@ class LiveChain:
     def _decide(self, goal: Float[np.ndarray, "2"]) -> None:
         """Ask the navigator for the next command."""
         pose = np.array([[*self._xy, self._yaw]])
-        seen: dict[str, Any] = {
-            "goal": goal_in_heading_frame(pose, goal[None]),
-            "previous_action": self._choice,
-            "pose": pose,
-            "true_pose": pose,
-        }
-        if self._navigator.camera is not None:
-            seen["depth"] = self._cameras["navigation"].look(self._walker.qpos[None])
-        self._choice = check_choice(self._navigator.act(seen), 1, self._navigator)
+        depth = None if self._navigator.camera is None else self._cameras["navigation"].look(self._walker.qpos[None])
+        self._choice = decide(self._navigator, goal[None], self._choice, pose, depth=depth)
         self._command[0] = [self._choice[0, 0], 0.0, self._choice[0, 1]]
 
     # ---- the world -------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
+from torch import Tensor
 
 from vinl.config.errors import InputError
 from vinl.robot.cameras import Camera
@@ -54,6 +55,46 @@ class Navigator(Protocol):
 
 ORACLE = "oracle"
 """The name of the shortest-path follower."""
+
+
+def goal_in_heading_frame(pose: Float[np.ndarray, "n 3"], goal: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
+    """Straight distance to the goal [m], cosine and sine of its bearing, left positive [ViNL code]."""
+    to = goal - pose[:, :2]
+    bearing = np.arctan2(to[:, 1], to[:, 0]) - pose[:, 2]
+    return np.stack([np.linalg.norm(to, axis=1), np.cos(bearing), np.sin(bearing)], 1)
+
+
+def decide(
+    navigator: Navigator,
+    goals: Float[np.ndarray, "n 2"],
+    previous: Float[np.ndarray, "n 2"],
+    pose: Float[np.ndarray, "n 3"],
+    believed: Float[np.ndarray, "n 3"] | None = None,
+    depth: Tensor | None = None,
+) -> Float[np.ndarray, "n 2"]:
+    """Ask a navigator: forward speeds [m/s] and yaw rates [rad/s].
+
+    Args:
+        navigator: see ``Navigator.act``, whose observation is made here and nowhere else.
+        goals: x, y of each robot's goal [m].
+        previous: what it answered last.
+        pose: x, y [m] and yaw [rad] where the robots are.
+        believed: where they believe to be; None: that is where they are.
+        depth: (n, height, width) what its camera sees [m].
+
+    Raises:
+        InputError: what it answers is no answer.
+    """
+    believed = pose if believed is None else believed
+    seen: dict[str, Any] = {
+        "goal": goal_in_heading_frame(believed, goals),
+        "previous_action": previous,
+        "pose": believed,
+        "true_pose": pose,
+    }
+    if depth is not None:
+        seen["depth"] = depth
+    return check_choice(navigator.act(seen), len(pose), navigator)
 
 
 def check_choice(choice: Any, n: int, navigator: Navigator) -> Float[np.ndarray, "n 2"]:
