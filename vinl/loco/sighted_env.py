@@ -14,7 +14,8 @@ from vinl.rl.stopwatch import Stopwatch
 
 
 class SightedVecEnv(LocoVecEnv):
-    """One more observation group: ``depth`` (n, H, W) float16 in [0, 1].
+    """More observation groups: ``depth`` (n, H, W) float16 in [0, 1], and what a student learns to predict, ``plan``,
+    ``heights`` and ``velocity``, see ``environment.Observations``.
 
     Args:
         environment: the robots.
@@ -46,6 +47,8 @@ class SightedVecEnv(LocoVecEnv):
 
     def _pack(self, seen: dict[str, torch.Tensor], done: torch.Tensor | None) -> TensorDict:
         observation = super()._pack(seen, done)
+        for name in ("plan", "heights", "velocity"):
+            observation[name] = seen[name]
         with self._stopwatch.part("render"):
             observation["depth"] = self.sight.look(seen["pose"], done)
         return observation

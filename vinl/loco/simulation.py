@@ -201,14 +201,15 @@ class Simulation:
         self.ground: Ground = jax.device_put(jax.tree.map(jnp.asarray, ground), jax.devices()[0])
         bare = np.where(field.labels == BLOCK, 0.0, field.heights)  # blocks stand on level tiles
         self._bare = ((bare - low) / span).astype(np.float32).reshape(-1)
-        self._solid = normalised
+        self._solid, self._is_solid = normalised, True
         self._ground_rows, self._leg_rows = self._find_contact_rows()
         self._substeps = jax.vmap(self._control_step, in_axes=(None, 0, 0, 0))
 
     def set_solid(self, solid: bool) -> None:
         """From the next step on blocks collide, or are only seen and judged; nothing is compiled anew."""
-        if solid == bool(self.ground.solid):
+        if solid == self._is_solid:  # asked before every iteration: without a wait for the device
             return
+        self._is_solid = solid
         device = jax.devices()[0]
         normalised = jax.device_put(jnp.asarray(self._solid if solid else self._bare), device)
         flag = jax.device_put(jnp.asarray(np.array(solid)), device)

@@ -23,8 +23,7 @@ memory that the other still reads."""
 
 class LocoVecEnv(VecEnv):
     """Observation groups: ``policy`` (with noise, in the order of ``gait.observation.STEPPING_MAP_TABLE``), ``critic``
-    (the same exactly, then what only the critic knows), and what a student learns to predict: ``plan``, ``heights``
-    and ``velocity``, see ``environment.Observations``.
+    (the same exactly, then what only the critic knows).
 
     Args:
         environment: the robots.
@@ -103,7 +102,6 @@ class LocoVecEnv(VecEnv):
         """``seen``: the fields of ``Observations``; ``done`` (n,) where an episode has just begun, None: no step was
         made."""
         groups = {"policy": seen["noisy"], "critic": torch.cat([seen["exact"], seen["privileged"]], 1)}
-        groups |= {name: seen[name] for name in ("plan", "heights", "velocity")}
         return TensorDict(groups, batch_size=[self.num_envs])  # type: ignore[arg-type]
 
     def _in_torch(self, seen: Observations) -> dict[str, torch.Tensor]:
