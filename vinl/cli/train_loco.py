@@ -25,8 +25,8 @@ class Options:
     overrides: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
     """Settings of the config as key=value."""
     stage: int = 1
-    """1: walk on rough ground with the height scan. 2: step over blocks, seeing them in the height scan.
-    3: step over blocks, seeing them through a depth camera; learns from a policy of stage 2."""
+    """1: walk on rough ground. 2: step over blocks, to footholds that are chosen on a map. 3: the same with a depth
+    camera in place of the map; learns from a policy of stage 2."""
     from_policy: Annotated[str | None, tyro.conf.arg(name="from")] = None
     """Start from the networks of this policy (a shipped name or a folder) or run; default: the config's."""
     config: str | None = None
