@@ -10,7 +10,9 @@ from pathlib import Path
 
 from vinl.cli.app import main
 
-WORDS = "--floorplans harbour_flat --loco teacher --obstacles paper --episodes 3 --seeds 2 --set time_limit=4"
+WORDS = (
+    "--floorplans harbour_flat --loco teacher --nav oracle --obstacles paper --episodes 3 --seeds 2 --set time_limit=4"
+)
 OPTIONS = WORDS.split()
 
 

@@ -11,7 +11,7 @@ from vinl.cli.app import main
 from vinl.policies.io import save_policy
 from vinl.policies.policy import LocomotionPolicy
 
-COMMON = "--floorplans harbour_flat old_town --episodes 2 --seeds 2 --workers 1 --set time_limit=0.3"
+COMMON = "--nav oracle --floorplans harbour_flat old_town --episodes 2 --seeds 2 --workers 1 --set time_limit=0.3"
 
 
 def read(folder: str | Path) -> dict:

@@ -99,7 +99,7 @@ def test_any_number_survives_as_an_override(value: float):
             "name: x\nppo: {epoch: 3}",
             r"bad\.yaml: unknown key 'ppo\.epoch', did you mean 'epochs'\?; known: epochs, rate",
         ),
-        ("name: x\nppo: {epochs: 2.5}", r"ppo\.epochs must be int, got 2\.5"),
+        ("name: x\nppo: {epochs: 2.5}", r"ppo\.epochs must be a whole number, got 2\.5"),
         ("name: x\nppo: {epochs: true}", r"ppo\.epochs must be a number, got True"),
         ("name: x\nppo: {hidden: 64}", r"ppo\.hidden must be tuple\[int, \.\.\.\], got 64"),
         ("name: x\nppo: {hidden: abc}", r"ppo\.hidden must be a list, got 'abc'"),
@@ -129,7 +129,7 @@ def test_bad_files(text: str, message: str):
         ("ppo.rate.x=3", r"ppo\.rate holds a single value"),
         ("ppo=3", "ppo is a group of values"),
         ("ppo.epochs=[1", "has no readable value"),
-        ("ppo.epochs=many", r"ppo\.epochs must be int, got 'many'"),
+        ("ppo.epochs=many", r"ppo\.epochs must be a whole number, got 'many'"),
     ],
 )
 def test_bad_overrides(override: str, message: str):

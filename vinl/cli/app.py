@@ -106,7 +106,7 @@ options:
   -h, --help    this text; vinl COMMAND --help explains a command
   --version     the version
 
-try: vinl eval --floorplans harbour_flat --loco rough --nav oracle --episodes 2 --out runs/first --video"""
+try: vinl eval --floorplans harbour_flat --episodes 2 --seeds 1 --video"""
 
 
 if __name__ == "__main__":

@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-import tyro
 from rich.console import Console
 from rich.table import Table
 
-from vinl.cli.options import parse_options, settings_first
-from vinl.cli.policies import flatten
+from vinl.cli.options import Settings, parse_options, settings_first
 from vinl.config.errors import InputError
 
 
@@ -20,6 +18,8 @@ from vinl.config.errors import InputError
 class LocoOptions:
     """Control steps per second of the training environment (MJX), with height scan and contact."""
 
+    overrides: Settings = ()
+    """Settings of the config as key=value."""
     num_envs: int = 4096
     """Robots in parallel."""
     seconds: float = 10.0
@@ -56,6 +56,8 @@ class DepthOptions:
 class NavOptions:
     """Steps per second of the navigation environment with a depth image each, and what its homes cost."""
 
+    overrides: Settings = ()
+    """Settings of the config as key=value."""
     num_envs: int | None = None
     """Robots in parallel (default: 4096 on a GPU, 32 on a CPU)."""
     homes: int | None = None
@@ -64,8 +66,8 @@ class NavOptions:
     """How long to measure [s]."""
     config: str = "nav/default"
     """Name of a shipped config or a YAML file."""
-    tree: Literal["sah", "lbvh"] | None = None
-    """How the ray trees of the homes are built: sah on the host, lbvh on a GPU (default: Warp's choice)."""
+    tree: Literal["auto", "sah", "lbvh"] = "auto"
+    """How the ray trees of the homes are built: sah on the host, lbvh on a GPU; auto is Warp's choice."""
     device: str = "auto"
     """cpu, cuda, or auto: cuda where there is one."""
     json: bool = False
@@ -77,7 +79,7 @@ class MemoryOptions:
     """GPU memory that a training of the navigation policy takes, predicted without a GPU [GB]: an upper estimate, as a
     compiled network keeps less for its backward pass."""
 
-    overrides: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    overrides: Settings = ()
     """Settings of the config as key=value, such as num_envs=512 ppo.minibatches=16 homes.count=2000."""
     config: str = "nav/default"
     """Name of a shipped config or a YAML file."""
@@ -92,13 +94,13 @@ def main(argv: list[str]) -> int:
         print("usage: vinl bench loco|nav|depth|memory [OPTIONS]\n\nvinl bench loco --help and so on list them.")
         return 0
     if what == "loco":
-        options = parse_options(LocoOptions, argv[1:], "bench loco")
+        options = parse_options(LocoOptions, settings_first(LocoOptions, argv[1:]), "bench loco")
         figures = _bench_loco(options)
     elif what == "depth":
         options = parse_options(DepthOptions, argv[1:], "bench depth")
         figures = _bench_depth(options)
     elif what == "nav":
-        options = parse_options(NavOptions, argv[1:], "bench nav")
+        options = parse_options(NavOptions, settings_first(NavOptions, argv[1:]), "bench nav")
         figures = _bench_nav(options)
     elif what == "memory":
         options = parse_options(MemoryOptions, settings_first(MemoryOptions, argv[1:]), "bench memory")
@@ -117,7 +119,7 @@ def _bench_loco(options: LocoOptions) -> dict[str, Any]:
     from vinl.config.loader import load_config
     from vinl.loco.config import LocoConfig
 
-    config = load_config(LocoConfig, options.config)
+    config = load_config(LocoConfig, options.config, options.overrides)
     from vinl.loco.benchmark import run_loco
 
     return run_loco(options.num_envs, options.seconds, config)
@@ -133,8 +135,15 @@ def _bench_nav(options: NavOptions) -> dict[str, Any]:
     from vinl.nav.benchmark import run_nav
     from vinl.nav.config import NavConfig
 
-    config = load_config(NavConfig, options.config)
-    return run_nav(options.num_envs, options.homes, options.seconds, device, config, options.tree)
+    config = load_config(NavConfig, options.config, options.overrides)
+    return run_nav(
+        options.num_envs,
+        options.homes,
+        options.seconds,
+        device,
+        config,
+        None if options.tree == "auto" else options.tree,
+    )
 
 
 def _predict_memory(options: MemoryOptions) -> dict[str, Any]:
@@ -162,12 +171,9 @@ def _bench_depth(options: DepthOptions) -> dict[str, Any]:
 
 
 def _device(name: str) -> str:
-    """``auto`` becomes what there is; another device must exist."""
-    import torch
+    from vinl.policies.device import choose_training_device
 
-    from vinl.policies.device import choose_device
-
-    return str(choose_device(("cuda" if torch.cuda.is_available() else "cpu") if name == "auto" else name))
+    return choose_training_device(name)
 
 
 def _refuse(value: float | None, option: str) -> None:
@@ -179,6 +185,8 @@ def _print(figures: dict[str, Any], what: str, as_json: bool) -> None:
     if as_json:
         print(json.dumps(figures, indent=2))
         return
+    from vinl.cli.policies import flatten
+
     table = Table("measure", "value", title=f"vinl bench {what}")
     for key, value in flatten(figures).items():
         table.add_row(key, str(value))

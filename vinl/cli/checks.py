@@ -44,7 +44,7 @@ def check_configs() -> str:
         raise RuntimeError("no config is installed")
     for name in names:
         read_config(name)
-    return ", ".join(names)
+    return f"{len(names)} shipped, all can be read"
 
 
 def check_plans() -> str:
@@ -58,7 +58,7 @@ def check_plans() -> str:
     bare = [name for name, area in areas.items() if area < 1]
     if bare:
         raise RuntimeError(f"{bare[0]} has no free floor")
-    return ", ".join(f"{name} ({area:.0f} m²)" for name, area in areas.items())
+    return f"{len(names)} shipped, {min(areas.values()):.0f} to {max(areas.values()):.0f} m2 of free floor"
 
 
 def check_depth() -> str:
@@ -115,7 +115,7 @@ def check_policy() -> str:
         action = policy.act(zeros, None if camera is None else np.ones((2, camera.height, camera.width), np.float32))
         if not np.isfinite(action).all():
             raise RuntimeError(f"{policy.card.name} acts {action}")
-    return f"{', '.join(names)} act" if names else "none is shipped; an untrained network acts"
+    return f"{len(names)} shipped, all act" if names else "none is shipped; an untrained network acts"
 
 
 def check_video() -> str:

@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass
 from importlib import metadata
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from vinl.cli import checks
@@ -104,20 +103,16 @@ _MARKS = {"ok": ("✓", "green"), "failed": ("✗", "bold red"), ABSENT: ("-", "
 
 def _print(versions: dict[str, str], extra: dict[str, str], devices: dict[str, str], results: list[Result]) -> None:
     console = Console()
-    table = Table("package", "version", "needed for")
-    for name, version in versions.items():
-        table.add_row(name, version, "everything")
-    for name, version in extra.items():
-        table.add_row(name, version, "training")
-    console.print(table)
-    table = Table("library", "devices")
+    main_versions = ", ".join(f"{name} {versions[name]}" for name in ("vinl", "python", "mujoco", "torch"))
+    console.print(main_versions, highlight=False, soft_wrap=True)
+    missing = [name for name, version in {**versions, **extra}.items() if version == ABSENT]
+    if missing:
+        console.print(f"not installed: {', '.join(missing)} (training needs {TRAIN_HINT})", soft_wrap=True)
     for name, device in devices.items():
-        table.add_row(name, Text(device))
-    console.print(table)
-    table = Table("", "part", "what was seen", "s")
+        console.print(f"{name:<6}{device}", highlight=False, soft_wrap=True)
     for result in results:
         mark, style = _MARKS[result.state]
-        table.add_row(Text(mark, style), result.part, Text(result.detail), f"{result.seconds:.1f}")
-    console.print(table)
+        line = Text(f"{mark} ", style).append(f"{result.part:<14}", "default").append(result.detail, "default")
+        console.print(line, soft_wrap=True)
     failed = [result.part for result in results if result.state == "failed"]
     console.print(f"failed: {', '.join(failed)}" if failed else "all parts work")

@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import tyro
-
-from vinl.cli.options import parse_options
+from vinl.cli.options import Settings, parse_options, settings_first
+from vinl.cli.places import default_out
 from vinl.config.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,17 +26,18 @@ if TYPE_CHECKING:
 class Options:
     """Walk a robot through floor plans and measure how it went: results.json, report.html and films."""
 
-    out: str
-    """Folder for results.json, report.html and films."""
+    overrides: Settings = ()
+    """Rules of the episodes in place of the config's, for example time_limit=60."""
+    out: str | None = None
+    """Folder for results.json, report.html and films (default: runs/eval- and who walks)."""
     floorplans: tuple[str, ...] = ()
     """Files (.png, .pgm, ROS .yaml, ProcTHOR .json or .jsonl.gz:17) or names of shipped plans; all shipped ones by
     default."""
     loco: str | None = None
-    """Locomotor: a shipped policy's name, or a policy folder; by default the best that is shipped: loco, else
-    teacher, else rough."""
+    """Locomotor: a shipped policy's name, a policy folder or a training run (default: loco)."""
     nav: str | None = None
-    """Navigator: oracle (follows the shortest way, the default), a shipped navigation policy's name, or a policy
-    folder. With --table it takes the place of the learned navigator of all rows."""
+    """Navigator: a shipped navigation policy's name, a policy folder, a training run, or oracle, which follows the
+    shortest way (default: nav). With --table it takes the place of the learned navigator of all rows."""
     episodes: int = 10
     """Start/goal pairs in each plan; the same for all seeds."""
     routes: str | None = None
@@ -50,14 +50,14 @@ class Options:
     """Free the robots of a learned navigator where they are stuck: they back up, turn away and walk on. No part of any
     policy."""
     obstacles: str | None = None
-    """Clutter: none (the default), paper or dense."""
+    """Clutter: none, paper or dense (default: paper)."""
     table: bool = False
     """Walk all rows of a table instead of one robot, each the same episodes, beside the paper's figures."""
     table_file: str = "eval/table"
     """Rows of the table: a shipped config or a YAML file."""
     faults: bool = False
     """Walk the same episodes again with each of a matrix of faults (late motors, noisy sensors ...), one at a time,
-    beside the ideal robot. For a single setting without --faults: --set faults.action_delay=0.02."""
+    beside the ideal robot. For a single setting without --faults: faults.action_delay=0.02."""
     faults_file: str = "eval/faults"
     """The faults: a shipped config or a YAML file."""
     rows: tuple[str, ...] = ()
@@ -78,8 +78,8 @@ class Options:
     fresh: bool = False
     """Begin anew: forget what an earlier run left in the folder. Otherwise the same command goes on where it was
     interrupted."""
-    device: str = "cpu"
-    """Device of the policies: cpu or cuda. Only cpu repeats bit for bit."""
+    device: str = "auto"
+    """Of the policies: cpu, cuda, or auto: cpu, the only one that repeats bit for bit."""
     resolution: float | None = None
     """Metres per pixel of floor plans that are bare pictures; 0.05 if not given."""
     min_speck: int = 0
@@ -93,29 +93,38 @@ class Options:
     the goal is."""
     config: str = "eval/default"
     """Rules of the episodes: a shipped config or a YAML file."""
-    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="KEY=VALUE")] = ()
-    """Changes to the config, for example time_limit=60."""
 
 
 def main(argv: list[str]) -> int:
     """Run the evaluation and print where its files lie."""
-    options = parse_options(Options, argv, "eval")
+    options = parse_options(Options, settings_first(Options, argv), "eval")
     from vinl.benchmark.evaluate import check_numbers, name_apart
     from vinl.benchmark.outputs import check_folder
     from vinl.benchmark.protocol import Films, Protocol
     from vinl.benchmark.routes import read_routes
     from vinl.benchmark.shard import Shard
+    from vinl.chain.choose import best_locomotor
+    from vinl.chain.navigators.choose import best_navigator
+    from vinl.cli.kinds import check_config
     from vinl.config.output import check_out, strip_command
     from vinl.world.readers import load_floorplans
 
-    out = check_out(options.out)
+    who = (
+        ("table",)
+        if options.table
+        else ("faults",)
+        if options.faults
+        else (options.loco or best_locomotor(), options.nav or best_navigator())
+    )
+    out = check_out(default_out("eval", *who) if options.out is None else options.out)
     workers = os.cpu_count() or 1 if options.workers is None else options.workers
     films: Films = "all" if options.video_all else "first" if options.video else "none"
-    check_numbers(options.episodes, options.seeds, options.first_seed, options.obstacles or "none", workers)
+    check_numbers(options.episodes, options.seeds, options.first_seed, options.obstacles or "paper", workers)
     if options.faults and (options.table or options.shard != "1/1"):
         raise InputError("--faults goes neither with --table nor with --shard; evaluate them one after the other")
     check_folder(out, options.table or options.faults)
     shard = Shard.parse(options.shard)
+    check_config(options.config, "evaluation")
     config = _load_rules(options)
 
     def prepare() -> Protocol:
@@ -219,8 +228,10 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], wor
 def _load_single(options: Options) -> Row:
     """Who walks without a table."""
     from vinl.chain.choose import best_locomotor
+    from vinl.chain.navigators.choose import best_navigator
 
-    loco, nav, obstacles = options.loco or best_locomotor(), options.nav or "oracle", options.obstacles or "none"
+    loco, nav = options.loco or best_locomotor(), options.nav or best_navigator()
+    obstacles = options.obstacles or "paper"
     return _load_row(loco, nav, obstacles, options.recovery, options)
 
 
@@ -243,7 +254,7 @@ def _load_rules(options: Options) -> EvaluationConfig:
         errors.append(f"sensors={name if name.endswith(('.yaml', '.yml')) else f'sensors/{name}'}")
     if options.drift is not None:
         errors.append(f"odometry.drift=[{options.drift},{options.drift}]")
-    return load_config(EvaluationConfig, options.config, [*errors, *options.set])
+    return load_config(EvaluationConfig, options.config, [*errors, *options.overrides])
 
 
 def _progress(console: Console, out: Path) -> Progress:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vinl.cli.options import parse_options
+from vinl.cli.places import default_out
 from vinl.config.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,10 +25,11 @@ _COURSES = {"commands": None, "robots": 64, "seconds": 20.0, "density": None, "l
 class Options:
     """Let robots walk on level floor, rough ground, blocks, litter or bars; measure tracking, falls and contacts."""
 
-    out: str
-    """Folder for results.json, contacts.png (on blocks) and what --video films."""
+    out: str | None = None
+    """Folder for results.json, contacts.png (on blocks) and what --video films (default: runs/eval-loco- and the
+    policies)."""
     policy: str | None = None
-    """A shipped policy's name, or a policy folder; rough by default."""
+    """A shipped policy's name, or a policy folder or training run (default: loco)."""
     compare: tuple[str, ...] = ()
     """Several policies in place of --policy: all on the same courses, one table."""
     terrain: str = "flat"
@@ -62,18 +64,19 @@ class Options:
     eight (bar_10cm.png)."""
     workers: int | None = None
     """Processes; the number of cores by default. Results do not depend on it."""
-    device: str = "cpu"
-    """Device of the policy: cpu or cuda."""
+    device: str = "auto"
+    """Of the policies: cpu, cuda, or auto: cpu, the only one that repeats bit for bit."""
 
 
 def main(argv: list[str]) -> int:
     """Run the evaluation and print its figures."""
     options = parse_options(Options, argv, "eval-loco")
+    from vinl.chain.choose import best_locomotor
     from vinl.config.output import check_out, strip_command
 
     if options.policy is not None and options.compare:
         raise InputError("--policy and --compare exclude each other; name all policies after --compare")
-    names = list(options.compare) or [options.policy or "rough"]
+    names = list(options.compare) or [options.policy or best_locomotor()]
     if len(set(names)) < len(names):
         raise InputError(f"--compare names a policy twice: {' '.join(names)}")
     foreign = _COURSES if options.terrain == "bars" else {**_BARS, "video": False}
@@ -82,7 +85,8 @@ def main(argv: list[str]) -> int:
             where = "is not for --terrain bars" if name in _COURSES else "is for --terrain bars alone"
             raise InputError(f"--{name} {where}")
     run = _run_bars if options.terrain == "bars" else _run_courses
-    run(options, names, check_out(options.out), ["vinl", "eval-loco", *strip_command(argv)])
+    out = check_out(default_out("eval-loco", *names[:3]) if options.out is None else options.out)
+    run(options, names, out, ["vinl", "eval-loco", *strip_command(argv)])
     return 0
 
 

@@ -6,6 +6,7 @@ import time
 from dataclasses import asdict, dataclass
 
 from vinl.cli.options import parse_options
+from vinl.cli.places import default_out
 from vinl.config.errors import InputError
 
 
@@ -14,10 +15,10 @@ class Options:
     """Drive a navigator to goals in the kinematic environment and measure success, SPL and collisions: results.json
     and report.html."""
 
-    policy: str
+    policy: str = "nav"
     """A shipped navigator's name, the folder of a policy or run, or oracle: a follower of short ways."""
-    out: str
-    """Folder for results.json and report.html."""
+    out: str | None = None
+    """Folder for results.json and report.html (default: runs/eval-nav- and the policy)."""
     floorplans: tuple[str, ...] = ()
     """Floor plans beside the generated homes; FILE:50-99 are plans 50 to 99 of a JSON file, FILE:50- those from 50 on,
     FILE:0-/2 every second."""
@@ -51,8 +52,8 @@ class Options:
     """Largest geodesic distance [m]."""
     steps: int = 250
     """Decisions of 0.5 s until an episode is out of time."""
-    device: str = "cpu"
-    """cpu or cuda. Only cpu repeats bit for bit."""
+    device: str = "auto"
+    """Of homes and policy: cpu, cuda, or auto: cpu, the only one that repeats bit for bit."""
 
 
 def main(argv: list[str]) -> int:
@@ -79,7 +80,7 @@ def main(argv: list[str]) -> int:
         render_navigation_report,
     )
 
-    out = check_out(options.out)
+    out = check_out(default_out("eval-nav", options.policy) if options.out is None else options.out)
     homes = (0 if options.floorplans or options.sets else 200) if options.homes is None else options.homes
     if homes < 0:
         raise InputError(f"--homes must not be negative, got {homes}")

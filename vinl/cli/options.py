@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
+import dataclasses
+import inspect
 import io
 import re
-from dataclasses import fields
-from typing import Any, TypeVar
+import textwrap
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import tyro
 
@@ -15,13 +20,25 @@ from vinl.config.errors import InputError
 T = TypeVar("T")
 _FRAME = " │╰╯─"
 _SETTING = re.compile(r"[A-Za-z_][\w.]*=")
+_WORDS: dict[Any, tuple[str, str]] = {
+    int: ("N", "a whole number"),
+    float: ("X", "a number"),
+    str: ("TEXT", "text"),
+    Path: ("PATH", "a path"),
+}
+"""What stands for a value in the help, and in an error."""
+
+Settings = Annotated[
+    tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="[KEY=VALUE ...]", help_behavior_hint="")
+]
+"""Type of a field for ``settings_first``'s words."""
 
 
 def parse_options(options: type[T] | Any, argv: list[str], command: str, *markers: Any) -> T:
     """Options from the command line; ``--help`` prints them and ends the process.
 
     Args:
-        options: dataclass, or a union of them as subcommands; its docstring and those of its fields become the help.
+        options: dataclass; its docstring and those of its fields become the help.
         argv: arguments after the command.
         command: ``"eval"``, for the usage line.
         markers: further ``tyro.conf`` settings.
@@ -29,14 +46,17 @@ def parse_options(options: type[T] | Any, argv: list[str], command: str, *marker
     Raises:
         InputError: an option is unknown, missing or of the wrong type; one line, with the option that was meant.
     """
-    said = io.StringIO()
+    _use_plain_words(options)
+    said, settings = io.StringIO(), (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone, *markers)
     try:
         with contextlib.redirect_stderr(said):
-            return tyro.cli(options, args=argv, prog=f"vinl {command}", config=(tyro.conf.FlagCreatePairsOff, *markers))
+            return tyro.cli(options, args=argv, prog=f"vinl {command}", config=settings)
     except SystemExit as end:
         if not end.code:
             raise
-        raise InputError(f"{_essence(said.getvalue())} (vinl {command} --help lists the options)") from None
+        raise InputError(
+            f"{_say_plainly(said.getvalue(), options)} (vinl {command} --help lists the options)"
+        ) from None
 
 
 def settings_first(options: type[Any], argv: list[str]) -> list[str]:
@@ -46,7 +66,8 @@ def settings_first(options: type[Any], argv: list[str]) -> list[str]:
         options: dataclass of the command; tells flags with a value from those without.
         argv: arguments after the command.
     """
-    switches = {"--" + field.name.replace("_", "-") for field in fields(options) if field.type in (bool, "bool")}
+    switches = {"--" + field.name.replace("_", "-") for field in dataclasses.fields(options) if _is_switch(field)}
+    argv = [word for word in argv if word != "--set"]  # as it was written before
     settings: list[str] = []
     others: list[str] = []
     for k, word in enumerate(argv):
@@ -54,6 +75,58 @@ def settings_first(options: type[Any], argv: list[str]) -> list[str]:
         is_value = last.startswith("--") and "=" not in last and last not in switches
         (settings if _SETTING.match(word) and not is_value else others).append(word)
     return settings + others
+
+
+def _is_switch(field: dataclasses.Field[Any]) -> bool:
+    return field.type in (bool, "bool")
+
+
+def _kind(annotation: Any) -> Any:
+    """What one value of a field is: the type in ``X | None`` or ``tuple[X, ...]``."""
+    kinds = [kind for kind in get_args(annotation) if kind not in (type(None), Ellipsis)]
+    return _kind(kinds[0]) if kinds and get_origin(annotation) is not None else annotation
+
+
+def _use_plain_words(options: type[Any]) -> None:
+    """Names of values as people write them, and no default where the help's own words tell it."""
+    if "_plain" in options.__dict__:
+        return
+    hints, texts = get_type_hints(options, include_extras=True), _read_docstrings(options)
+    for field in dataclasses.fields(options):
+        hint = hints[field.name]
+        told = field.default is None or isinstance(field.default, (bool, tuple)) or "tuple" in str(field.type)
+        bare = get_args(hint)[0] if get_origin(hint) is Annotated else hint
+        word = _WORDS.get(_kind(bare), (None, ""))[0]
+        if word is not None and get_origin(bare) is tuple:
+            word = f"{word} ..."
+        own = [extra for extra in getattr(hint, "__metadata__", ()) if getattr(extra, "metavar", None) is not None]
+        metavar, told_by_words = own[0].metavar if own else word, "" if told else None
+        about = tyro.conf.arg(help=texts.get(field.name), metavar=metavar, help_behavior_hint=told_by_words)
+        options.__annotations__[field.name] = Annotated[hint, about]
+    options._plain = True
+
+
+def _read_docstrings(options: type[Any]) -> dict[str, str]:
+    """The string under each field as one paragraph: tyro would keep the line breaks of the source."""
+    body = cast(ast.ClassDef, ast.parse(textwrap.dedent(inspect.getsource(options))).body[0]).body
+    texts = {}
+    for field, below in pairwise(body):
+        if isinstance(field, ast.AnnAssign) and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
+            texts[cast(ast.Name, field.target).id] = " ".join(str(below.value.value).replace("``", "").split())
+    return texts
+
+
+def _say_plainly(box: str, options: type[Any]) -> str:
+    """What tyro says about a wrong option, in the words of the help."""
+    said = _essence(box)
+    wrong = re.match(r"Error parsing (?:--)?([\w.-]+)[^:]*: (?:no type matching|invalid|could not)[^']*'([^']*)'", said)
+    hints = get_type_hints(options)
+    name = wrong.group(1).replace("-", "_") if wrong else ""
+    if wrong is None or name not in hints:
+        return said
+    kind = _kind(hints[name])
+    wanted = _WORDS[kind][1] if kind in _WORDS else f"one of {', '.join(map(str, get_args(hints[name])))}"
+    return f"--{wrong.group(1)} must be {wanted}, got {wrong.group(2)!r}"
 
 
 def _essence(box: str) -> str:

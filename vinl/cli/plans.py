@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
-import tyro
 from tyro.conf import Positional
 
+from vinl.cli.options import Settings, parse_options, settings_first
 from vinl.config.errors import InputError
 
 USAGE = """usage: vinl plans list                    the floor plans that travel with the package
@@ -43,7 +42,9 @@ class ShowPlan:
 class GeneratePlans:
     """Make up homes: rooms, doors and furniture from a seed, one JSON file each, and a picture of all of them."""
 
-    out: Path
+    overrides: Settings = ()
+    """Settings of the config, for example area=[60,90] furniture_density=[0,0]."""
+    out: Path = Path("runs/homes")
     """Folder for home-SEED.json, and contact.png with all homes in it."""
     count: int = 20
     """How many homes."""
@@ -51,10 +52,8 @@ class GeneratePlans:
     """Seed of the first home; the others follow. The same seed gives the same home."""
     config: Path | None = None
     """YAML file of what homes are like (area, door_width, furniture_density, ...: see docs/floorplans.md)."""
-    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="KEY=VALUE")] = ()
-    """Settings of the config, for example area=[60,90] furniture_density=[0,0]."""
-    picture: bool = True
-    """Draw contact.png: at most the first 100 homes."""
+    no_picture: bool = False
+    """Leave contact.png away, a picture of the first 100 homes."""
 
 
 @dataclass(frozen=True)
@@ -68,13 +67,11 @@ def main(argv: list[str]) -> int:
     Raises:
         InputError: if the plan or an option cannot be used.
     """
-    from vinl.cli.options import parse_options
-
     what = argv[0] if argv else "--help"
     if what == "show":
         _show_plan(parse_options(ShowPlan, argv[1:], "plans show"))
     elif what == "generate":
-        _generate_plans(parse_options(GeneratePlans, argv[1:], "plans generate"))
+        _generate_plans(parse_options(GeneratePlans, settings_first(GeneratePlans, argv[1:]), "plans generate"))
     elif what == "list":
         parse_options(ListPlans, argv[1:], "plans list")
         _list_plans()
@@ -104,15 +101,15 @@ def _generate_plans(options: GeneratePlans) -> None:
     if options.seed < 0:
         raise InputError(f"--seed {options.seed}: give a number, 0 or more")
     if options.config is None:
-        config = build_config(HomeConfig, {}, options.set, source="--set")
+        config = build_config(HomeConfig, {}, options.overrides)
     else:
-        config = load_config(HomeConfig, options.config, options.set)
+        config = load_config(HomeConfig, options.config, options.overrides)
     plans = [generate_home(options.seed + k, config) for k in range(options.count)]
     for plan in plans:
         write_floorplan(plan, options.out / f"{plan.name}.json")
     areas = [plan.area_m2 for plan in plans]
     print(f"{len(plans)} homes in {options.out}, {min(areas):.0f} to {max(areas):.0f} m2 of free floor")
-    if options.picture:
+    if not options.no_picture:
         print(f"  picture   {save_contact_sheet(plans[:100], options.out / 'contact.png')}")
 
 

@@ -18,8 +18,8 @@ class Options:
 
     folders: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Folders that vinl eval wrote."""
-    out: str
-    """Folder for results.json and report.html; with one folder only, it may be that folder."""
+    out: str | None = None
+    """Folder for results.json and report.html (default: of one folder that folder, of several runs/report)."""
     reference: str | None = None
     """Row of a table that the others are compared with."""
 
@@ -35,7 +35,10 @@ def main(argv: list[str]) -> int:
     from vinl.benchmark.table_report import print_table
     from vinl.config.output import check_out
 
-    out, console = check_out(options.out), Console()
+    out, console = (
+        check_out(options.out or (options.folders[0] if len(options.folders) == 1 else "runs/report")),
+        Console(),
+    )
     found = gather_folders([Path(folder) for folder in options.folders], out, options.reference)
     if found.is_table:
         print_table(console, write_table(out, found.rows, found.reference, found.left_out, found.command), out)

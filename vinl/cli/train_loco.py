@@ -9,7 +9,8 @@ from typing import Annotated
 
 import tyro
 
-from vinl.cli.options import parse_options, settings_first
+from vinl.cli.loggers import Logger, start_logger
+from vinl.cli.options import Settings, parse_options, settings_first
 from vinl.config.errors import InputError
 
 
@@ -22,7 +23,7 @@ class Options:
     ppo.epochs=3 or commands.forward='[0, 1]'.
     """
 
-    overrides: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    overrides: Settings = ()
     """Settings of the config as key=value."""
     stage: int = 1
     """1: walk on rough ground. 2: step over blocks, to footholds that are chosen on a map. 3: the same with a depth
@@ -47,6 +48,9 @@ class Options:
     """Of everything random (default: the config's)."""
     save_every: float = 60.0
     """Seconds between checkpoints."""
+    logger: Logger = "tensorboard"
+    """Who draws the curves beside the run's own metrics.jsonl: tensorboard (its files are always written), or wandb,
+    which reads along."""
 
 
 STAGES = {1: "loco/rough", 2: "loco/teacher", 3: "loco/student"}
@@ -65,29 +69,35 @@ def main(argv: list[str]) -> int:
         raise InputError(
             "--resume goes on with the run's own config; only --iterations, --minutes and --device may be given"
         )
-    from vinl.policies.device import choose_device
+    from vinl.policies.device import choose_training_device
 
-    device = options.device
-    if device == "auto":
-        import torch
-
-        device = "cuda" if torch.cuda.is_available() else "cpu"
-    choose_device(device)
+    device = choose_training_device(options.device)
     os.environ.setdefault("JAX_PLATFORMS", "cpu" if device == "cpu" else "cuda,cpu")
 
+    from vinl.rl.compile_cache import use_compile_cache
+
+    use_compile_cache()
+    from vinl.cli.kinds import check_config, check_run, check_source
     from vinl.config.loader import load_config
+    from vinl.config.output import check_out
     from vinl.loco.config import LocoConfig
-    from vinl.loco.training import train_locomotor
     from vinl.rl.not_finite import NotFiniteError
+    from vinl.rl.out_of_memory import explain_out_of_memory
+    from vinl.rl.run_folder import RunFolder
 
     if options.resume:
         folder, config = options.resume, None
+        check_run(folder, "locomotion", options.iterations)
+        num_envs = int(RunFolder(folder).open().get("num_envs", 0))
     else:
         source = options.config or STAGES[options.stage]
+        check_config(source, "locomotion")
         short = {"num_envs": options.num_envs, "iterations": options.iterations, "seed": options.seed}
         overrides = [*options.overrides, *(f"{k}={v}" for k, v in short.items() if v is not None)]
         config = load_config(LocoConfig, source, overrides)
+        num_envs = config.num_envs
         if options.from_policy is not None:
+            check_source(options.from_policy, "locomotion")
             config = replace(config, from_policy=options.from_policy)
         if options.stage not in (1, config.stage):
             raise InputError(f"--stage {options.stage}: {source} is a config of stage {config.stage}")
@@ -96,9 +106,14 @@ def main(argv: list[str]) -> int:
         raise InputError(f"--minutes must be positive, got {options.minutes}")
     if options.iterations is not None and options.iterations < 1:
         raise InputError(f"--iterations must be at least 1, got {options.iterations}")
+    check_out(folder)
+    from vinl.loco.training import train_locomotor
+
+    start_logger(options.logger, folder)
     try:
         limits = {"iterations": options.iterations, "minutes": options.minutes}
-        complete = train_locomotor(config, folder, device, save_every=options.save_every, **limits)
+        with explain_out_of_memory(num_envs):
+            complete = train_locomotor(config, folder, device, save_every=options.save_every, **limits)
     except NotFiniteError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -12,7 +12,8 @@ from typing import Annotated
 
 import tyro
 
-from vinl.cli.options import parse_options, settings_first
+from vinl.cli.loggers import Logger, start_logger
+from vinl.cli.options import Settings, parse_options, settings_first
 from vinl.config.errors import InputError
 
 INTERRUPTED = 130
@@ -28,7 +29,7 @@ class Options:
     ppo.epochs=1 or motion.amplitude=[0,1].
     """
 
-    overrides: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    overrides: Settings = ()
     """Settings of the config as key=value."""
     config: str = "default"
     """default, blind or paper (shipped configs of nav/), or a YAML file."""
@@ -54,6 +55,9 @@ class Options:
     """Of everything random but the homes (default: the config's)."""
     save_every: float = 60.0
     """Seconds between checkpoints."""
+    logger: Logger = "tensorboard"
+    """Who draws the curves beside the run's own metrics.jsonl: tensorboard (its files are always written), or wandb,
+    which reads along."""
     profile: bool = False
     """Write where the time of the sixth iteration goes to profile.txt in the run's folder."""
 
@@ -80,31 +84,45 @@ def main(argv: list[str]) -> int:
         )
     device = _choose_device(options)
 
+    from vinl.cli.kinds import check_config, check_run, check_source
     from vinl.config.loader import load_config
+    from vinl.config.output import check_out
     from vinl.nav.config import NavConfig
+    from vinl.rl.out_of_memory import explain_out_of_memory
+    from vinl.rl.run_folder import RunFolder
 
     if options.resume:
         folder, config = options.resume, None
+        check_run(folder, "navigation", options.iterations)
+        num_envs = int(RunFolder(folder).open().get("num_envs", 0))
     else:
         short = {"num_envs": options.num_envs, "iterations": options.iterations, "seed": options.seed}
         overrides = [*options.overrides, *(f"{k}={v}" for k, v in short.items() if v is not None)]
+        check_config(options.config, "navigation")
+        if options.from_policy is not None:
+            check_source(options.from_policy, "navigation")
         config = load_config(NavConfig, _config_source(options.config), overrides)
+        num_envs = config.num_envs
         folder = options.out or f"runs/nav-{options.config.removesuffix('.yaml').split('/')[-1]}"
+    check_out(folder)
     if options.devices > 1 and "RANK" not in os.environ:
         return _start_processes(options.devices, argv)
     from vinl.nav.training import train_navigator
 
-    complete = train_navigator(
-        config,
-        folder,
-        device,
-        save_every=options.save_every,
-        iterations=options.iterations,
-        minutes=options.minutes,
-        from_policy=options.from_policy,
-        profile=options.profile,
-        memory=options.memory,
-    )
+    if int(os.environ.get("RANK", "0")) == 0:
+        start_logger(options.logger, folder)
+    with explain_out_of_memory(num_envs):
+        complete = train_navigator(
+            config,
+            folder,
+            device,
+            save_every=options.save_every,
+            iterations=options.iterations,
+            minutes=options.minutes,
+            from_policy=options.from_policy,
+            profile=options.profile,
+            memory=options.memory,
+        )
     if int(os.environ.get("RANK", "0")) == 0:
         print(
             f"trained: {folder}/policy  (try: vinl eval-nav --policy {folder} --out {folder}/eval)"
@@ -122,12 +140,9 @@ def _config_source(name: str) -> str:
 def _choose_device(options: Options) -> str:
     import torch
 
-    from vinl.policies.device import choose_device
+    from vinl.policies.device import choose_training_device
 
-    device = options.device
-    if device == "auto":
-        device = "cuda" if torch.cuda.is_available() else "cpu"
-    choose_device(device)
+    device = choose_training_device(options.device)
     if device != "cpu" and options.devices > torch.cuda.device_count():
         raise InputError(f"--devices {options.devices}: there are only {torch.cuda.device_count()} CUDA devices")
     return device

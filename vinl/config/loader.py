@@ -16,6 +16,9 @@ from vinl.config.yaml_text import parse_override_value, read_yaml
 
 T = TypeVar("T")
 
+_WORDS = {int: "a whole number", float: "a number", bool: "true or false", str: "text"}
+"""Types as people call them."""
+
 
 def load_config(cls: type[T], name_or_path: str | Path, overrides: Sequence[str] = ()) -> T:
     """A configuration from a YAML file and overrides.
@@ -45,7 +48,21 @@ def read_config(name_or_path: str | Path) -> dict[str, Any]:
 
 
 def build_config(cls: type[T], data: Mapping[str, Any], overrides: Sequence[str] = (), source: str = "config") -> T:
-    """A configuration from plain data, such as ``dump_config`` returns; ``source`` names it in errors."""
+    """A configuration from plain data, such as ``dump_config`` returns; ``source`` names it in errors, or the override
+    without which it would be right."""
+    try:
+        return _build(cls, data, overrides, source)
+    except InputError:
+        for k in range(len(overrides)):
+            try:
+                _build(cls, data, overrides[:k], source)
+            except InputError:
+                break  # wrong before this override
+            _build(cls, data, overrides[: k + 1], source=overrides[k])
+        raise
+
+
+def _build(cls: type[T], data: Mapping[str, Any], overrides: Sequence[str], source: str) -> T:
     merged = _merge({}, data)
     for override in overrides:
         _apply(cls, merged, override)
@@ -55,11 +72,9 @@ def build_config(cls: type[T], data: Mapping[str, Any], overrides: Sequence[str]
     except dacite.MissingValueError as error:
         raise InputError(f"{source}: {error.field_path} is missing; add it") from None
     except dacite.WrongTypeError as error:
-        kind = getattr(error.field_type, "__name__", None) if isinstance(error.field_type, type) else None
-        wanted = kind or str(error.field_type).replace("typing.", "")
-        raise InputError(
-            f"{source}: {error.field_path} must be {wanted}, got {error.value!r} ({type(error.value).__name__})"
-        ) from None
+        kind = error.field_type
+        wanted = _WORDS.get(kind) or (kind.__name__ if isinstance(kind, type) else str(kind).replace("typing.", ""))
+        raise InputError(f"{source}: {error.field_path} must be {wanted}, got {error.value!r}") from None
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
     except (dacite.DaciteError, ValueError, TypeError) as error:

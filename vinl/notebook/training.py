@@ -12,8 +12,11 @@ from typing import Any
 
 from vinl.config.errors import InputError
 from vinl.config.loader import load_config
+from vinl.policies.device import choose_training_device
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
+from vinl.rl.compile_cache import use_compile_cache
+from vinl.rl.out_of_memory import explain_out_of_memory
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ def train(
     config: str,
     overrides: Sequence[str] = (),
     out: str | Path | None = None,
-    device: str = "cpu",
+    device: str = "auto",
     from_policy: str | None = None,
 ) -> Training:
     """Train a locomotor or a navigator, as ``vinl train-loco`` and ``vinl train-nav`` do. Needs the ``train`` extra.
@@ -53,26 +56,31 @@ def train(
         config: ``"loco/rough"``, ``"loco/teacher"``, ``"loco/student"``, ``"nav/default"`` and others in ``configs/``.
         overrides: settings as ``key=value``.
         out: folder of the new run; by default one below ``runs/`` that is not there yet.
-        device: ``"cpu"`` or ``"cuda"``.
+        device: ``"cpu"``, ``"cuda"``, or ``"auto"``: a GPU where there is one.
         from_policy: start from the networks of this policy or run; by default what the config says.
 
     Raises:
         InputError: a name, a setting or the folder cannot be used.
     """
+    device = choose_training_device(device)
     kind, folder = config.split("/")[0], _find_place(config) if out is None else Path(out)
     if kind == "nav":
         from vinl.nav.config import NavConfig
         from vinl.nav.training import train_navigator
 
         settings = load_config(NavConfig, config, overrides)
-        return Training(folder, train_navigator(settings, folder, device, from_policy=from_policy))
+        with explain_out_of_memory(settings.num_envs):
+            return Training(folder, train_navigator(settings, folder, device, from_policy=from_policy))
     if kind == "loco":
         os.environ.setdefault("JAX_PLATFORMS", "cpu" if device == "cpu" else "cuda,cpu")
+        use_compile_cache()
         from vinl.loco.config import LocoConfig
         from vinl.loco.training import train_locomotor
 
         more = [] if from_policy is None else [f"from_policy={from_policy}"]
-        return Training(folder, train_locomotor(load_config(LocoConfig, config, [*overrides, *more]), folder, device))
+        settings = load_config(LocoConfig, config, [*overrides, *more])
+        with explain_out_of_memory(settings.num_envs):
+            return Training(folder, train_locomotor(settings, folder, device))
     raise InputError(f"config {config!r} says neither loco/... nor nav/...; vinl train-loco and train-nav take files")
 
 

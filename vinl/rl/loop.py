@@ -192,7 +192,11 @@ class TrainingLoop:
         observation = self.env.get_observations().to(self.device)
         self.alg.train_mode()
         saved = begun = time.monotonic()
-        bar = TrainingProgress(iterations, first) if minutes is None else TrainingProgress(round(60 * minutes))
+        bar = (
+            TrainingProgress(iterations, first)
+            if minutes is None
+            else TrainingProgress(round(60 * minutes), unit="second")
+        )
         with bar as progress, self._interruptible(progress):
             while (share := self._share_done(iterations, begun, minutes)) < 1 and not self._stop and wrong is None:
                 start = time.perf_counter()

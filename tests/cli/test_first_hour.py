@@ -1,0 +1,200 @@
+"""What a new user meets first: help, lists, mistakes, and where results go."""
+
+import io
+import json
+import re
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from vinl.cli.app import COMMANDS, main
+from vinl.cli.places import default_out
+from vinl.config.errors import InputError
+from vinl.rl.out_of_memory import explain_out_of_memory
+from vinl.rl.progress import TrainingProgress
+from vinl.rl.run_folder import RunFolder
+
+HELPS = [
+    *([name] for name in COMMANDS if name not in ("plans", "bench")),
+    *(["plans", what] for what in ("list", "show", "generate")),
+    *(["bench", what] for what in ("loco", "nav", "depth")),
+]
+
+
+@pytest.mark.parametrize("command", HELPS, ids=" ".join)
+def test_help_uses_plain_words(command: list[str], capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit) as end:
+        main([*command, "--help"])
+    said = capsys.readouterr().out
+    assert not end.value.code and "usage: vinl" in said
+    for jargon in ("{None}", "STR", "(default: )", "(default: None)", "``", "(default: False)", "(default: True)"):
+        assert jargon not in said
+
+
+def test_no_help_imports_what_is_slow() -> None:
+    """Seconds are mostly torch: a command's options may not need it."""
+    code = f"""
+import sys, time
+from vinl.cli.app import main
+spent = {{}}
+for command in {HELPS!r}:
+    begun = time.process_time()
+    try:
+        main([*command, "--help"])
+    except SystemExit:
+        pass
+    spent[" ".join(command)] = time.process_time() - begun
+assert not {{"torch", "jax", "warp", "mujoco", "scipy"}} & set(sys.modules), sys.modules.keys()
+assert max(spent.values()) < 0.5, spent
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+MISTAKES = {
+    "eval --episodes x": "--episodes must be a whole number, got 'x'",
+    "train-nav --iterations x": "--iterations must be a whole number, got 'x'",
+    "bench nav --seconds x": "--seconds must be a number, got 'x'",
+    "eval time_limit=abc": "time_limit=abc: time_limit must be a number, got 'abc'",
+    "eval time_limit=-1": "time_limit=-1: time_limit must lie between",
+    "eval tim_limit=1": "did you mean 'time_limit'",
+    "eval --config loco/rough": "a config of locomotion, not of evaluation: use vinl train-loco",
+    "eval --floorplans harbor_flat": "did you mean 'harbour_flat'",
+    "eval --out=": "--out is empty",
+    "eval --out /proc/foo": "nothing can be written there",
+    "train-loco --config nav/default": "use vinl train-nav --config nav/default",
+    "train-nav --config loco/rough": "use vinl train-loco --config loco/rough",
+    "train-loco --stage 2 --from vinl/nav": "nav is a navigation policy: use vinl train-nav",
+    "train-nav --from loco": "loco is a locomotion policy: use vinl train-loco",
+    "train-loco --out /proc/foo": "nothing can be written there",
+    "train-nav --out /proc/foo": "nothing can be written there",
+    "train-nav --logger x": "'tensorboard', 'wandb'",
+}
+
+
+@pytest.mark.parametrize("words", MISTAKES, ids=lambda words: words.replace("/", "_"))
+def test_mistakes_are_one_line(words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(words.split(" ")) == 2
+    said = capsys.readouterr().err
+    assert MISTAKES[words] in said and said.count("\n") == 1
+
+
+def test_runs_of_the_other_kind_and_runs_that_are_done(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    nav, loco = RunFolder(tmp_path / "nav"), RunFolder(tmp_path / "loco")
+    nav.create({"homes": {}, "num_envs": 8})
+    loco.create({"commands": {}, "num_envs": 8})
+    loco.append_metrics({"iteration": 5})
+    for words, said in (
+        (f"train-loco --resume {nav.path}", f"is a navigation run: use vinl train-nav --resume {nav.path}"),
+        (f"train-nav --resume {loco.path}", f"is a locomotion run: use vinl train-loco --resume {loco.path}"),
+        (f"train-loco --resume {loco.path} --iterations 2", "already has 5 iterations"),
+    ):
+        assert main(words.split()) == 2
+        assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["picture.png", "plan.png"])
+def test_a_huge_picture_is_too_large_not_damaged(name: str, tmp_path: Path, capsys) -> None:
+    from PIL import Image
+
+    size = (20_000, 20_000) if name == "picture.png" else (12_000, 9_000)
+    Image.new("1", size).save(tmp_path / name)
+    assert main(["plans", "show", str(tmp_path / name)]) == 2
+    said = capsys.readouterr().err
+    assert "too large: up to 49 million pixels" in said and "--resolution" in said
+
+
+def test_where_results_go() -> None:
+    assert default_out("eval", "loco", "nav") == Path("runs/eval-loco-nav")
+    assert default_out("eval", "runs/mine/", "runs/other/policy") == Path("runs/eval-mine-other")
+
+
+def test_policies_fit_a_screen(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["policies"]) == 0
+    said = capsys.readouterr().out
+    assert len(said.splitlines()) <= 40 and max(map(len, said.splitlines())) <= 90
+    assert "depth 64 x 36" in said and "deg" in said and "success" in said
+    for name in ("loco", "nav"):
+        assert main(["policies", name]) == 0
+        said = capsys.readouterr().out
+        assert len(said.splitlines()) <= 45 and "deg down" in said
+    assert "[m/s]" in said
+    assert main(["policies", "loco", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["name"] == "loco"
+
+
+def test_training_bar_fits_80_columns() -> None:
+    screen = io.StringIO()
+    console = Console(file=screen, force_terminal=True, width=80, color_system=None, legacy_windows=False)
+    figures = {"samples/s": "245,000", "level": "3.10", "reward": "12.30", "tracking": "0.93/0.88"}
+    with TrainingProgress(1500, 0, console) as progress:
+        time.sleep(0.12)
+        progress.show(12, figures)
+        time.sleep(0.12)
+        progress.show(1234, figures)
+    said = screen.getvalue()
+    assert "compiling" in said
+    last = [line for line in re.sub(r"\x1b\[[\d;?]*\w|\r", "\n", said).splitlines() if "1234/1500" in line][-1]
+    assert len(last) <= 80 and "left" in last and "level 3.10" in last and "reward 12.30" in last
+    assert "tracking" not in said
+
+
+def test_piped_training_says_a_line_a_minute(monkeypatch) -> None:
+    lines, clock = io.StringIO(), [1000.0]
+    monkeypatch.setattr("vinl.rl.progress.time.monotonic", lambda: clock[0])
+    with TrainingProgress(100, 0, Console(file=lines, width=80)) as progress:
+        for k in range(1, 101):
+            clock[0] += 10.0
+            progress.show(k, {"level": f"{k}"})
+    said = lines.getvalue().splitlines()
+    assert said[0].startswith("compiling") and said[1].startswith("iteration 1/100")
+    assert said[-1].startswith("iteration 100/100") and 17 <= len(said) <= 19
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        RuntimeError("CUDA out of memory. Tried to allocate 20.00 GiB"),
+        RuntimeError("RESOURCE_EXHAUSTED: Out of memory while trying to allocate"),
+        MemoryError(),
+    ],
+)
+def test_full_memory_names_the_setting(error: Exception) -> None:
+    with pytest.raises(InputError, match=r"4096 robots do not fit .* --num-envs 2048"), explain_out_of_memory(4096):
+        raise error
+    with pytest.raises(RuntimeError, match="shapes"), explain_out_of_memory(4096):
+        raise RuntimeError("shapes differ")
+
+
+def test_a_checkpoint_that_does_not_fit_leaves_the_old_one(tmp_path: Path) -> None:
+    import torch
+
+    run = RunFolder(tmp_path)
+    run.save_checkpoint({"iteration": 1})
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
+    try:
+        with pytest.raises(OSError, match=r"checkpoint\.pt"):
+            run.save_checkpoint({"iteration": 2, "weights": torch.zeros(100_000)})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert [file.name for file in tmp_path.iterdir()] == ["checkpoint.pt"]
+    assert run.load_checkpoint() == {"iteration": 1}
+
+
+@pytest.mark.slow
+def test_full_disk_is_one_line(tmp_path: Path) -> None:
+    """Files may not grow beyond 8 KB: the same error as on a full disk."""
+    words = "eval --floorplans old_town --loco rough --nav oracle --episodes 1 --seeds 1 --workers 1 time_limit=0.5"
+    code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))\n"
+    code += f"from vinl.cli.app import main; sys.exit(main({[*words.split(), '--out', str(tmp_path / 'run')]!r}))"
+    done = subprocess.run([sys.executable, "-B", "-c", code], capture_output=True, text=True)
+    assert done.returncode == 2 and "Traceback" not in done.stderr, done.stderr
+    assert done.stderr.startswith("error: ") and "make room" in done.stderr
