@@ -130,8 +130,16 @@ def untrained_navigator() -> DepthPolicy:
     config = load_config(NavConfig, "nav/default")
     camera = NAVIGATION_CAMERA if config.camera is None else config.camera.record()
     network = config.network
-    sizes = {"height": camera.height, "width": camera.width, "visual": network.visual, "hidden": network.hidden}
-    actor = NavActor(network.vision, layers=network.layers, memory=network.memory, planes=network.planes, **sizes)
+    actor = NavActor(
+        network.vision,
+        height=camera.height,
+        width=camera.width,
+        visual=network.visual,
+        hidden=network.hidden,
+        layers=network.layers,
+        memory=network.memory,
+        planes=network.planes,
+    )
     return DepthPolicy(actor, navigation_card("untrained", actor.describe(), camera.describe()))
 
 
