@@ -72,7 +72,8 @@ def test_an_action_takes_effect_after_the_robots_latency(fresh):
     late = np.array([0.0, 0.01, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0], np.float32)
     state = fresh.state
     traits = plain_traits(8)._replace(latency=jnp.asarray(late))
-    body = state.body._replace(qpos=state.body.qpos.at[:, 2].add(3.0), qvel=jnp.zeros((8, 18)))
+    qpos = state.body.qpos.at[:, 2].add(3.0).at[:, 7:].set(jnp.asarray(DEFAULT_POSE, jnp.float32))
+    body = state.body._replace(qpos=qpos, qvel=jnp.zeros((8, 18)))
     quiet = {"step": jnp.zeros(8, jnp.int32), "push_left": jnp.full(8, 99, jnp.int32)}
     fresh.state = jax.device_put(state._replace(body=body, traits=traits, **quiet), jax.devices()[0])
     bend = jnp.zeros((8, 12)).at[:, 2].set(-4.0)

@@ -164,7 +164,7 @@ class LocoEnvironment:
         """
         if gait is not None:
             # copies: the step reuses the memory of the state that it is given
-            own = GaitState(*(jax.device_put(jnp.array(x), jax.devices()[0]) for x in gait))
+            own = GaitState(*(jax.device_put(jnp.array(x, jnp.float32), jax.devices()[0]) for x in gait))
             self.state = self.state._replace(walk=self.state.walk._replace(gait=own))
         self.state, self._lost, result = self._step(
             self.simulation.ground, self.state, self._lost, action, self._settings
