@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 for _name, _value in {
     "JAX_PLATFORMS": "cpu",
-    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1 "
+    "--xla_backend_optimization_level=0",  # to compile an environment takes half as long
     "OMP_NUM_THREADS": "1",
     "MPLBACKEND": "Agg",
     "NO_COLOR": "1",

@@ -64,5 +64,8 @@ def draw_traits(config: RandomisationConfig, key: Array, n: int) -> Traits:
 
 def plain_traits(n: int) -> Traits:
     """Robots as the model describes them, on feet with friction 1."""
-    one, zero = jnp.ones(n), jnp.zeros(n)
-    return Traits(one, zero, one, one, one, zero, jnp.zeros((n, 3)), jnp.zeros((n, 3)))
+    ones, zeros = (jnp.ones(n) for _ in range(4)), (jnp.zeros(n) for _ in range(2))  # no two share their memory
+    friction, kp, kd, joint_friction = ones
+    added_mass, latency = zeros
+    still = jnp.zeros((n, 3)), jnp.zeros((n, 3))
+    return Traits(friction, added_mass, kp, kd, joint_friction, latency, *still)
