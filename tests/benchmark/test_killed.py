@@ -30,8 +30,14 @@ def test_killed_and_started_again() -> None:
         if episodes.exists() and episodes.read_bytes().count(b"\n") >= 3:  # the session and two episodes
             break
         time.sleep(0.002)
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")  # Linux alone lists them
+    workers = [Path("/proc", child) for child in children.read_text().split()] if children.exists() else []
     process.send_signal(signal.SIGKILL)
     process.wait()
+    until = time.monotonic() + 60
+    while any(worker.exists() for worker in workers) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not any(worker.exists() for worker in workers)  # they do not walk on for nobody
     kept = episodes.read_bytes()
     assert 2 <= kept.count(b'"record"') < 6
     assert not Path("killed/results.json").exists()

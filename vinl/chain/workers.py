@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import os
 import pickle
 import queue
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import dataclass, replace
@@ -123,8 +125,17 @@ def _start(luggage: Any, messages: Any, stop: Any) -> None:
     """First thing in a worker. Ctrl-C reaches the whole group: only the parent answers it."""
     global _context
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     torch.set_num_threads(1)
     _context = Context(pickle.loads(luggage.get()), lambda *piece: messages.put(piece), stop.is_set)
+
+
+def _end_with_parent() -> None:
+    """A parent that is killed cannot tell its workers to stop: they would walk on for nobody."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _run(work: Callable[[Context, Any], T], job: Any) -> tuple[T, int]:
