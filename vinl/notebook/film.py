@@ -28,6 +28,9 @@ class Film:
     path: Path
     width: int = 800
 
+    def __repr__(self) -> str:
+        return f"Film({self.path.name})"
+
     def _repr_html_(self) -> str:
         """A player with the film inside: the notebook needs no file."""
         data = base64.b64encode(self.path.read_bytes()).decode()
