@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vinl.world.boxes import Boxes
+
 ON_LINE = 0.05
 """Two walls on parallel lines nearer than this [m] are one wall seen from its two sides."""
 
@@ -68,7 +70,7 @@ def raise_walls(walls: list[Wall], openings: list[Opening]) -> np.ndarray:
         for low, high, bottom in grown:
             x, y = start + along * (low + high) / 2
             rows.append([float(x), float(y), yaw, high - low, wall.thickness, bottom, wall.height])
-    table = np.array(rows).reshape(-1, 7)
+    table = Boxes(np.array(rows).reshape(-1, 7)).rows  # which refuses what is no box
     _, first = np.unique(np.round(table, 3), axis=0, return_index=True)
     return table[np.sort(first)]
 
