@@ -53,7 +53,6 @@ def test_eval_loco_writes_figures(policy: str) -> None:
         ("eval --out a --shard 3/2", "--shard 3/2"),
         ("eval --out a --shard half", "of the form 2/5"),
         ("eval --out taken", "is a file"),
-        ("eval", "--out"),
         ("eval-loco --out a --robots -1", "--robots"),
         ("eval-loco --out a --seconds 0", "--seconds"),
         ("eval-loco --out a --terrain swamp", "--terrain"),

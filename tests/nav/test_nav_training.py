@@ -175,7 +175,7 @@ def test_two_processes_train_one_policy(tmp_path, small):
         (["--save-every", "0"], "--save-every"),
         (["--resume", "x", "--seed", "3"], "--resume"),
         (["--resume", "x"], "no training run"),
-        (["--from", "rough", "homes.count=1"], "navigator"),
+        (["--from", "rough", "homes.count=1"], "locomotion policy"),
     ],
 )
 def test_bad_options_are_one_line(arguments, message, capsys, tmp_path):

@@ -79,6 +79,7 @@ def main(argv: list[str]) -> int:
         print_navigation_summary,
         render_navigation_report,
     )
+    from vinl.policies.device import choose_device
 
     out = check_out(default_out("eval-nav", options.policy) if options.out is None else options.out)
     homes = (0 if options.floorplans or options.sets else 200) if options.homes is None else options.homes
@@ -97,7 +98,8 @@ def main(argv: list[str]) -> int:
         options.steps,
         clutter=options.clutter,
     )
-    policy = load_navigator(options.policy, options.device)
+    device = str(choose_device(options.device))
+    policy = load_navigator(options.policy, device)
     config = describe_episodes(None if policy is None else policy.card, rules)
     console, begun = Console(), time.monotonic()
     results = []
@@ -107,7 +109,7 @@ def main(argv: list[str]) -> int:
             homes,
             options.homes_seed,
             options.floorplans,
-            options.device,
+            device,
             lambda done, total: status.update(f"building homes: {done} of {total}"),
             options.sets,
         )
