@@ -70,7 +70,7 @@ def test_what_is_left_out_of_the_mesh_is_never_seen(
     blocks = Blocks(np.vstack([BLOCK.rows, [[3.0, 3.0, 0.4, 0.2, 0.5, 0.15]]]))
     seen = open_depth_cameras(two_rooms, [blocks] * 40, camera, ceiling).look(poses)
     whole = DepthCamera([floorplan_mesh(two_rooms, blocks, ceiling)], camera)
-    expected = whole.look(np.zeros(40, int), poses[:, :3], matrix_of(np, poses[:, 3:7]))
+    expected = whole.render(np.zeros(40, int), poses[:, :3], matrix_of(np, poses[:, 3:7]))
     off = (seen - expected).abs().numpy()
     assert (off > 1e-4).mean() < 1e-4  # a ray along an edge may fall on either side
     assert expected.min() < 0.5 and seen.max() > 0.8 * camera.far

@@ -38,14 +38,14 @@ def spoil(monkeypatch, steps: dict[int, list[int]], speed: float = 1e9) -> None:
     """Before the control steps that are keys, a calf of the robots that are named turns at a mad speed [rad/s]."""
     real, count = LocoEnvironment.step, 0
 
-    def step(self: LocoEnvironment, action: jax.Array):
+    def step(self: LocoEnvironment, action: jax.Array, gait=None):
         nonlocal count
         for robot in steps.get(count, []):
             body = self.state.body
             body = body._replace(qvel=body.qvel.at[robot, 8].set(speed))
             self.state = jax.device_put(self.state._replace(body=body), jax.devices()[0])
         count += 1
-        return real(self, action)
+        return real(self, action, gait)
 
     monkeypatch.setattr(LocoEnvironment, "step", step)
 
@@ -90,7 +90,7 @@ def test_mjx_replays_the_very_step(fresh):
     target = np.asarray(DEFAULT_POSE, np.float32) + 0.25 * action
     values |= {
         "targets": np.stack([target, *before.targets[2, :2]]),
-        "delay": int(delay_steps(before.traits.latency)[2]),
+        "delay": int(delay_steps(jax.numpy.asarray(before.traits.latency))[2]),
     }
     values |= {"action": action, "last_action": before.action[2], "robot": 2, "iteration": 7, "seed": 1}
     fresh.step(jnp.broadcast_to(jnp.asarray(action), (8, 12)))

@@ -144,6 +144,11 @@ class LocoEnvironment:
         """Weights and widths from the next step on; a training may move them without compiling anew."""
         self._rewards = {name: np.float32(value) for name, value in asdict(rewards).items()}
 
+    @property
+    def noise(self) -> float:
+        """The fraction of all noise that robots have now."""
+        return float(self._noise_now)
+
     def set_noise(self, fraction: float) -> None:
         """How much of noise, biases and latency there is from the next step on, from 0 to 1."""
         self._noise_now = np.float32(fraction)

@@ -77,7 +77,8 @@ class LocoVecEnv(VecEnv):
 
     def save_state(self) -> dict[str, Any]:
         """The whole state of all robots, levels and random numbers included: arrays by the names of their fields."""
-        return {name: _saved(np.asarray(x)) for name, x in _by_name(self.environment.state).items()}
+        noise = torch.tensor(float(self.environment.noise))  # the first observation after a resumption has it too
+        return {name: _saved(np.asarray(x)) for name, x in _by_name(self.environment.state).items()} | {"noise": noise}
 
     def load_state(self, state: dict[str, Any]) -> None:
         """Go on from a saved state.
@@ -94,6 +95,8 @@ class LocoVecEnv(VecEnv):
             saved["sums"] = np.zeros(present["sums"].shape, np.float32)
         if any(saved[name].shape != x.shape for name, x in present.items()):
             raise ValueError(f"it holds {len(saved['step'])} robots, this run has {self.num_envs}")
+        if "noise" in state:
+            self.environment.set_noise(float(state["noise"]))
         leaves = [saved[name] for name in present]
         shape = jax.tree.structure(self.environment.state)
         self.environment.state = jax.device_put(jax.tree.unflatten(shape, leaves), jax.devices()[0])
