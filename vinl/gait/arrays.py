@@ -20,7 +20,8 @@ def _torch_constant(data: bytes, shape: tuple[int, ...], kind: str, dtype: Any, 
     """Kept: a copy to a GPU at every control step would wait for the device."""
     import torch
 
-    return torch.from_numpy(np.frombuffer(data, kind).reshape(shape).copy()).to(device=device, dtype=dtype)
+    with torch.inference_mode(False):  # one made while acting would be of no use to training
+        return torch.from_numpy(np.frombuffer(data, kind).reshape(shape).copy()).to(device=device, dtype=dtype)
 
 
 def to_index(xp: Any, values: Any) -> Any:
