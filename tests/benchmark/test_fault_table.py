@@ -6,12 +6,16 @@ from pathlib import Path
 import pytest
 
 from vinl.benchmark.fault_table import IDEAL, FaultMatrix
+from vinl.benchmark.work import Row
+from vinl.chain.config import EvaluationConfig
 from vinl.chain.fault_config import FaultConfig
+from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.config.loader import load_config
 from vinl.policies.io import save_policy
 from vinl.policies.policy import LocomotionPolicy
+from vinl.sensing.sensor_config import SensorConfig
 
 PLAN = "mill_loft"
 
@@ -30,7 +34,7 @@ def walk(policy: str, out: str, *more: str) -> dict:
 def test_each_fault_walks_the_episodes_of_the_ideal_row(policy: str, capsys: pytest.CaptureFixture[str]) -> None:
     data = walk(policy, "faults", "--faults", "--rows", "kp_0.8", "action_delay_40ms")
     assert list(data["rows"]) == [IDEAL, "action_delay_40ms", "kp_0.8"]
-    assert data["rows"]["kp_0.8"]["faults"]["kp_scale"] == 0.8
+    assert data["rows"]["kp_0.8"]["settings"] == ["faults.kp_scale=0.8"]
     assert data["rows"]["kp_0.8"]["difference"]["episodes"] == 1 and "difference" not in data["rows"][IDEAL]
     shown = capsys.readouterr().out
     assert "action_delay_40ms" in shown and "success %" in shown
@@ -46,9 +50,16 @@ def test_each_fault_walks_the_episodes_of_the_ideal_row(policy: str, capsys: pyt
 
 def test_shipped_matrix_has_every_kind_of_fault_alone() -> None:
     matrix = load_config(FaultMatrix, "eval/faults")
-    changed = [{k for k, v in vars(row).items() if v != getattr(FaultConfig(), k)} for row in matrix.rows.values()]
-    assert all(len(names) == 1 for names in changed)
-    assert set().union(*changed) == set(vars(FaultConfig()))
+    changed = [setting.partition("=")[0] for (setting,) in matrix.rows.values()]
+    assert {f"faults.{name}" for name in vars(FaultConfig())} <= set(changed)
+    assert {"sensors.pitch", "sensors.delay", "sensors.noise", "sensors.pixels"} <= set(changed)
+
+
+def test_a_row_changes_its_settings_alone(trotting: LocomotionPolicy) -> None:
+    rules = EvaluationConfig(time_limit=3.0, sensors=SensorConfig(noise=0.02))
+    row = Row(trotting, OracleNavigator(), settings=("sensors.pixels=0.05", "faults.kp_scale=0.8"))
+    sensors, faults = SensorConfig(noise=0.02, pixels=0.05), FaultConfig(kp_scale=0.8)
+    assert row.apply(rules) == EvaluationConfig(time_limit=3.0, sensors=sensors, faults=faults)
 
 
 @pytest.mark.parametrize(
@@ -71,6 +82,7 @@ def test_bad_input_is_one_line(options: str, words: str, policy: str, capsys: py
 
 
 def test_names_of_faults_are_names_of_folders() -> None:
-    for rows in ({}, {"ideal": FaultConfig()}, {"../a": FaultConfig()}):
-        with pytest.raises(InputError, match="rows"):
+    fault = ("faults.kp_scale=0.8",)
+    for rows in ({}, {"ideal": fault}, {"../a": fault}, {"a": ()}, {"a": ("faults.kp=1",)}):
+        with pytest.raises(InputError, match=r"rows|faults\.kp"):
             FaultMatrix(rows)

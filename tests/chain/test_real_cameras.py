@@ -51,7 +51,7 @@ def test_images_are_as_old_as_drawn(two_rooms: FloorPlan) -> None:
 
 def test_a_mount_that_is_off_moves_the_image(two_rooms: FloorPlan) -> None:
     poses = walk(8, 1)
-    errors = CameraErrors(SensorConfig(roll=0.03, pitch=0.03, height=0.02), list(range(8)))
+    errors = CameraErrors(SensorConfig(roll=(-0.03, 0.03), pitch=(-0.03, 0.03), height=(-0.02, 0.02)), list(range(8)))
     cameras = errors.put_on(open_depth_cameras(two_rooms, [Blocks.empty()] * 8, CAMERA))
     roll, pitch, height = cameras._sensor.drawn["offset"].double().numpy().T
     errors.note(poses[0])
@@ -66,6 +66,9 @@ def test_a_mount_that_is_off_moves_the_image(two_rooms: FloorPlan) -> None:
         pose[:, 2] += height[k]
         level = open_depth_cameras(two_rooms, [Blocks.empty()], askew).look(pose)
         assert (seen[k] - level[0]).abs().median() < 0.05  # but for the roll
+    down = look(two_rooms, SensorConfig(pitch=(0.04, 0.04)), [5], poses[:, :1])
+    lowered = open_depth_cameras(two_rooms, [Blocks.empty()], replace(CAMERA, pitch_down=CAMERA.pitch_down + 0.04))
+    torch.testing.assert_close(down, lowered.look(poses[0, :1]), atol=1e-4, rtol=1e-4)
 
 
 def test_errors_are_the_episodes_own(two_rooms: FloorPlan) -> None:

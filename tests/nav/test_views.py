@@ -118,7 +118,9 @@ def test_the_cameras_errors_reach_the_images(config, homes):
 def test_an_image_is_as_old_and_the_camera_as_askew_as_drawn(config, homes):
     settings = replace(config, num_envs=64, motion=MotionConfig())
     now = NavEnvironment(settings, homes)
-    old = NavEnvironment(replace(settings, sensors=SensorConfig(delay=(0.25, 0.25), pitch=0.02, height=0.01)), homes)
+    old = NavEnvironment(
+        replace(settings, sensors=SensorConfig(delay=(0.25, 0.25), pitch=(-0.02, 0.02), height=(-0.01, 0.01))), homes
+    )
     start = now.state["position"].clone()
     actions = torch.tensor([[0.6, 0.4]]).expand(64, 2)
     done = now.advance(actions)[1] | old.advance(actions)[1]

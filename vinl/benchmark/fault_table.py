@@ -12,11 +12,11 @@ from rich.console import Console
 from rich.table import Table
 
 from vinl.benchmark.paired import compare_rows
-from vinl.chain.fault_config import FaultConfig
+from vinl.chain.config import EvaluationConfig
 from vinl.chain.records import Results
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.config.loader import dump_config
+from vinl.config.loader import build_config
 from vinl.config.output import SCHEMA
 from vinl.config.versions import describe_environment
 
@@ -37,24 +37,28 @@ class FaultMatrix:
     """Which faults are tried.
 
     Attributes:
-        rows: by name, which is the name of the row's folder.
+        rows: by name, which is the name of the row's folder; each is settings of an ``EvaluationConfig``, as on the
+            command line.
 
     Raises:
-        InputError: there is no row, or a name is none for a folder.
+        InputError: there is no row, a name is none for a folder, or a row has no settings, or impossible ones.
     """
 
-    rows: dict[str, FaultConfig]
+    rows: dict[str, tuple[str, ...]]
 
     def __post_init__(self) -> None:
         if not self.rows:
             raise InputError("rows: no fault is named")
-        for name in self.rows:
+        for name, settings in self.rows.items():
+            if not settings:
+                raise InputError(f"rows.{name}: no setting; give one, such as faults.kp_scale=0.8")
+            build_config(EvaluationConfig, {}, settings, source=f"rows.{name}")
             if name == IDEAL or not _NAME.match(name):
                 raise InputError(
                     f"rows: {name!r} cannot name a fault; take small letters, digits and _.- (ideal is the row without)"
                 )
 
-    def choose(self, names: Sequence[str]) -> dict[str, FaultConfig]:
+    def choose(self, names: Sequence[str]) -> dict[str, tuple[str, ...]]:
         """The rows of these names, or all; the one without faults comes first.
 
         Raises:
@@ -64,17 +68,17 @@ class FaultMatrix:
             if name not in self.rows and name != IDEAL:
                 known = ", ".join(self.rows)
                 raise InputError(f"--rows: there is no fault {name!r}{closest(name, self.rows)}; known: {known}")
-        return {IDEAL: FaultConfig()} | {k: v for k, v in self.rows.items() if not names or k in names}
+        return {IDEAL: ()} | {k: v for k, v in self.rows.items() if not names or k in names}
 
 
 def summarise_faults(
-    faults: Mapping[str, FaultConfig], results: Sequence[Results], command: Sequence[str], min_metres: float
+    faults: Mapping[str, Sequence[str]], results: Sequence[Results], command: Sequence[str], min_metres: float
 ) -> dict[str, Any]:
     """What ``results.json`` of the matrix holds: each row's figures, and its differences from the ideal row over the
     same episodes. The episodes lie in the rows' folders."""
     rows: dict[str, Any] = {}
-    for (name, fault), one in zip(faults.items(), results, strict=True):
-        rows[name] = {"faults": dump_config(fault), "aggregate": one.aggregate}
+    for (name, settings), one in zip(faults.items(), results, strict=True):
+        rows[name] = {"settings": list(settings), "aggregate": one.aggregate}
         if name != IDEAL:
             rows[name]["difference"] = compare_rows(one.records, results[0].records, min_metres)
     first = results[0]

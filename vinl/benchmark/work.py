@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import TypeVar
@@ -12,11 +12,11 @@ from vinl.benchmark.shard import Shard
 from vinl.chain.batching import is_steady, is_steady_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_setup
-from vinl.chain.fault_config import FaultConfig
 from vinl.chain.navigators.base import Navigator
 from vinl.chain.records import Episode, Key
 from vinl.chain.rollout import run_episodes
 from vinl.chain.workers import Context
+from vinl.config.loader import build_config, dump_config
 from vinl.policies.policy import Policy
 from vinl.render.video import FilmJob, film, name_film
 from vinl.world.clutter import CLUTTER
@@ -34,16 +34,16 @@ _PIECES = 3
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One line of a table: who walks, through what clutter, with what faults (None: those of the protocol)."""
+    """One line of a table: who walks, through what clutter, under which rules (settings in place of the protocol's)."""
 
     locomotor: Policy
     navigator: Navigator
     obstacles: str = "none"
-    faults: FaultConfig | None = None
+    settings: tuple[str, ...] = ()
 
     def apply(self, config: EvaluationConfig) -> EvaluationConfig:
-        """The rules with the row's own faults."""
-        return config if self.faults is None else replace(config, faults=self.faults)
+        """The rules with the row's own settings."""
+        return build_config(EvaluationConfig, dump_config(config), self.settings) if self.settings else config
 
 
 @dataclass(frozen=True, eq=False)

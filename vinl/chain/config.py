@@ -61,7 +61,7 @@ class EvaluationConfig:
         sensors: errors of the depth cameras of navigator and locomotor, see ``vinl.sensing.sensor_config``.
         odometry: errors of where a learned navigator believes to be; it arrives where the goal is.
         oracle: how the shortest-path follower walks.
-        faults: what is wrong with motors, body and sensors; nothing by default.
+        faults: what is wrong with motors, body and state estimate; nothing by default.
     """
 
     time_limit: float = 125.0

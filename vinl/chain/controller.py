@@ -101,14 +101,11 @@ def open_controller(
     blocks: Sequence[Blocks],
     ceiling: float | None = None,
     errors: CameraErrors | None = None,
-    pitch: float = 0.0,
 ) -> LocomotionController:
-    """The controller of robots in a floor plan, each with its own clutter, see ``open_depth_cameras``.
-
-    ``errors`` are those of their cameras, which look down by ``pitch`` [rad] more than they should.
-    """
+    """The controller of robots in a floor plan, each with its own clutter, see ``open_depth_cameras``; ``errors`` are
+    those of their cameras."""
     scan = GroundMap(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
-    cameras = None if locomotor.camera is None else open_depth_cameras(plan, blocks, locomotor.camera, ceiling, pitch)
+    cameras = None if locomotor.camera is None else open_depth_cameras(plan, blocks, locomotor.camera, ceiling)
     config = find_gait(locomotor.card)
     gait = None if config is None else GaitReader(config, map_plan(plan, blocks))
     return LocomotionController(

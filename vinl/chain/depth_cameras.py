@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import torch
@@ -83,7 +82,7 @@ class DepthCameras:
 
 
 def open_depth_cameras(
-    plan: FloorPlan, blocks: Sequence[Blocks], camera: Camera, ceiling: float | None = None, pitch: float = 0.0
+    plan: FloorPlan, blocks: Sequence[Blocks], camera: Camera, ceiling: float | None = None
 ) -> DepthCameras:
     """The cameras of robots in their homes: walls, furniture, floor and the clutter of each episode.
 
@@ -92,10 +91,7 @@ def open_depth_cameras(
         blocks: the clutter, one for each robot. Robots without any share one mesh.
         camera: what each robot carries.
         ceiling: height of a ceiling [m]; none by default.
-        pitch: the cameras look down by so much more than their record says [rad].
     """
-    if pitch:
-        camera = replace(camera, pitch_down=camera.pitch_down + pitch)
     meshes: list[Mesh] = []
     worlds: list[int] = []
     bare = -1

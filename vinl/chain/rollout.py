@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
@@ -71,13 +70,12 @@ def run_episodes(
     faults = config.faults
     blocks = [setup.blocks for setup in setups]
     keys = [sensor_key(setup) for setup in setups]
-    of_cameras, pitch = faults.add_to(config.sensors), math.radians(faults.camera_pitch)
-    sensors = None if of_cameras.is_ideal else CameraErrors(of_cameras, keys)
+    sensors = None if config.sensors.is_ideal else CameraErrors(config.sensors, keys)
     state = FaultyState(faults, [draw_faults(setup) for setup in setups]) if faults.spoils_state else None
-    controller = open_controller(locomotor, plan, blocks, config.ceiling, sensors, pitch)
+    controller = open_controller(locomotor, plan, blocks, config.ceiling, sensors)
     cameras = None
     if navigator.camera is not None:
-        cameras = open_depth_cameras(plan, blocks, navigator.camera, config.ceiling, pitch)
+        cameras = open_depth_cameras(plan, blocks, navigator.camera, config.ceiling)
     if cameras is not None and sensors is not None:
         cameras = sensors.put_on(cameras)
     reckoning = None if config.odometry.is_exact else DeadReckoning(config.odometry, keys)

@@ -57,7 +57,7 @@ class Options:
     """Rows of the table: a shipped config or a YAML file."""
     faults: bool = False
     """Walk the same episodes again with each of a matrix of faults (late motors, noisy sensors ...), one at a time,
-    beside the ideal robot. For a single setting without --faults: faults.action_delay=0.02."""
+    beside the ideal robot. For a single setting without --faults: faults.action_delay=0.02, sensors.pixels=0.05."""
     faults_file: str = "eval/faults"
     """The faults: a shipped config or a YAML file."""
     rows: tuple[str, ...] = ()
@@ -177,7 +177,7 @@ def _run_faults(options: Options, out: Path, prepare: Callable[[], Protocol], wo
     protocol, console = prepare(), Console()
     if not protocol.config.faults.is_neutral:
         raise InputError("--faults tries one fault at a time; leave the group faults of the config as it is")
-    rows = [replace(row, faults=fault) for fault in faults.values()]
+    rows = [replace(row, settings=settings) for settings in faults.values()]
     folders = [out / name for name in faults]
     with _progress(console, out) as progress:
         results = evaluate_rows(rows, protocol, workers, folders, True, options.fresh, command, progress.show)

@@ -20,13 +20,18 @@ LIMITS = {
     "edge_step": (0.01, 10.0),
     "surfaces": (0.0, 1.0),
     "surface_size": (0.05, 10.0),
-    "roll": (0.0, 0.5),
-    "pitch": (0.0, 0.5),
-    "height": (0.0, 0.2),
 }
 """Limits of the single numbers of ``SensorConfig``."""
 
-RANGES = {"patch_size": (0.01, 1.0), "range": (0.0, 1000.0), "delay": (0.0, 0.4), "amplitude": (0.0, 10.0)}
+RANGES = {
+    "patch_size": (0.01, 1.0),
+    "range": (0.0, 1000.0),
+    "delay": (0.0, 0.4),
+    "roll": (-1.0, 1.0),
+    "pitch": (-1.0, 1.0),
+    "height": (-0.2, 0.2),
+    "amplitude": (0.0, 10.0),
+}
 """Limits of its ranges. A delay stays below the 0.5 s between two decisions."""
 
 
@@ -51,8 +56,9 @@ class SensorConfig:
         surface_size: side of such a surface [m].
         range: nearer and from the far end on nothing returns [m].
         delay: range of the age of an image when the policy gets it [s].
-        roll, pitch: the camera is mounted off by an angle, uniform within +- this [rad].
-        height: and off in height, uniform within +- this [m].
+        roll, pitch: range of the angles by which the camera is mounted off, uniform; right side down and nose down are
+            positive [rad].
+        height: range by which it is mounted too high, uniform [m].
         amplitude: range of a factor on ``noise``, ``pixels``, ``patches``, ``edges`` and ``surfaces``, uniform.
     """
 
@@ -67,9 +73,9 @@ class SensorConfig:
     surface_size: float = 0.5
     range: Range = (0.0, 1000.0)
     delay: Range = (0.0, 0.0)
-    roll: float = 0.0
-    pitch: float = 0.0
-    height: float = 0.0
+    roll: Range = (0.0, 0.0)
+    pitch: Range = (0.0, 0.0)
+    height: Range = (0.0, 0.0)
     amplitude: Range = (1.0, 1.0)
 
     def __post_init__(self) -> None:
@@ -98,7 +104,7 @@ class SensorConfig:
     @property
     def moves(self) -> bool:
         """Whether images are taken from another place or at another time than the ideal camera's."""
-        return any((self.roll, self.pitch, self.height)) or self.delay[1] > 0
+        return any((*self.roll, *self.pitch, *self.height)) or self.delay[1] > 0
 
 
 def load_sensors(name: str) -> SensorConfig:

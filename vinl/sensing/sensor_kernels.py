@@ -35,9 +35,9 @@ class SensorRules:
     surface_size: wp.float32
     range: wp.vec2
     delay: wp.vec2
-    roll: wp.float32
-    pitch: wp.float32
-    height: wp.float32
+    roll: wp.vec2
+    pitch: wp.vec2
+    height: wp.vec2
     amplitude: wp.vec2
 
 
@@ -64,9 +64,9 @@ def draw_cameras(rules: SensorRules, key: wp.array(dtype=wp.int32), chosen: wp.a
     low = rules.amplitude[0]
     cameras.amplitude[n] = low + (rules.amplitude[1] - low) * wp.randf(state)
     cameras.scale[n] = 1.0 + rules.scale * (2.0 * wp.randf(state) - 1.0)
-    roll = rules.roll * (2.0 * wp.randf(state) - 1.0)
-    pitch = rules.pitch * (2.0 * wp.randf(state) - 1.0)
-    height = rules.height * (2.0 * wp.randf(state) - 1.0)
+    roll = rules.roll[0] + (rules.roll[1] - rules.roll[0]) * wp.randf(state)
+    pitch = rules.pitch[0] + (rules.pitch[1] - rules.pitch[0]) * wp.randf(state)
+    height = rules.height[0] + (rules.height[1] - rules.height[0]) * wp.randf(state)
     cameras.offset[n] = wp.vec3(roll, pitch, height)
     cameras.delay[n] = rules.delay[0] + (rules.delay[1] - rules.delay[0]) * wp.randf(state)
     cameras.surfaces[n] = wp.randi(state, 0, 2147483647)
