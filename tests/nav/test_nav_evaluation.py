@@ -9,6 +9,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from vinl.benchmark.routes import place_route
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.episode import draw_routes
+from vinl.chain.metrics import spl
 from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
@@ -22,7 +26,9 @@ from vinl.nav.report import aggregate_by_distance, choose_drawn
 from vinl.nav.training import check_seeds, make_card
 from vinl.nav.warm_start import build_actor
 from vinl.policies.io import save_policy
-from vinl.world.readers import expand_paths
+from vinl.world.free_space import FreeSpace
+from vinl.world.readers import expand_paths, load_floorplan
+from vinl.world.start_goal import measure_route
 
 TINY = {"camera": {"width": 32, "height": 24, "mount_height": 0.3}, "network": {"vision": "cnn", "hidden": 8}}
 
@@ -49,7 +55,7 @@ def test_the_oracle_arrives_and_an_untrained_policy_does_not(tmp_path, untrained
     same = ("start", "goal", "yaw", "geodesic_m", "plan", "episode")
     for a, b in zip(oracle["episodes"], poor["episodes"], strict=True):
         assert all(a[key] == b[key] for key in same)
-        assert a["geodesic_m"] >= 5.0 and a["geodesic_m"] >= a["straight_m"] - 0.15
+        assert a["geodesic_m"] >= max(4.85, a["straight_m"])  # the range holds for the environment's coarser grid
     assert sum(poor["aggregate"]["end_reasons"].values()) == poor["aggregate"]["episodes"] == 6
     assert poor["policies"]["navigation"]["trained_in"]["seed"] == 1
     assert list(oracle["kinds"]) == ["shipped"] and oracle["kinds"]["shipped"]["distances"]
@@ -68,6 +74,20 @@ def test_paths_end_where_the_record_says(untrained):
         assert len(trace.path) == round(record.time_s / 0.5) + 1
         left = np.linalg.norm(trace.path[-1] - record.goal)
         assert not record.success or left < 0.33
+
+
+def test_shortest_paths_and_spl_are_those_of_the_whole_chain():
+    plan = load_floorplan("harbour_flat")
+    config, space = describe_episodes(None, NavEvaluation(episodes=6, steps=28)), FreeSpace(plan)
+    kind = evaluate_kind(None, "shipped", HomeStore.from_plans([plan], config), config)
+    for r in kind.records:
+        route = place_route(space, np.array(r.start), np.array(r.goal))  # as of vinl eval --routes
+        assert r.geodesic_m == pytest.approx(route.geodesic_m, abs=2e-3)
+        assert r.spl == pytest.approx(spl(r.success, route.geodesic_m, r.distance_m), abs=1e-3)
+    assert 0 < sum(r.success for r in kind.records) < 6
+    for route in draw_routes(plan, 4, EvaluationConfig()):  # as of vinl eval
+        again = measure_route(space, route.start, route.goal)
+        assert again.geodesic_m == pytest.approx(route.geodesic_m, abs=1e-5)
 
 
 def test_the_camera_is_the_policys_and_its_motion_the_rules(untrained):

@@ -14,8 +14,7 @@ from vinl.config.fields import closest
 from vinl.config.yaml_text import read_yaml
 from vinl.world.floorplan import FloorPlan
 from vinl.world.free_space import FreeSpace
-from vinl.world.geodesic import distance_field, read_field
-from vinl.world.start_goal import StartGoal
+from vinl.world.start_goal import StartGoal, measure_route
 
 
 def read_routes(path: Path, plans: Sequence[FloorPlan]) -> dict[str, list[StartGoal]]:
@@ -64,15 +63,13 @@ def place_route(
         why = explain_place(space, point)
         if why:
             raise InputError(f"{source}: {name} ({point[0]:.2f}, {point[1]:.2f}) {why}")
-    frame = space.plan.frame
-    straight = float(np.linalg.norm(goal - start))
-    away = float(read_field(distance_field(space.traversable, frame, goal), frame, start))
-    if not np.isfinite(away):
+    route = measure_route(space, start, goal)
+    if not np.isfinite(route.geodesic_m):
         raise InputError(
             f"{source}: no path leads from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f}): they "
             f"lie in rooms without a passage of {2 * space.radius:.2f} m between them"
         )
-    return StartGoal(start, 0.0, goal, max(away, straight), straight)
+    return route
 
 
 def explain_place(space: FreeSpace, point: Float[np.ndarray, "2"]) -> str:

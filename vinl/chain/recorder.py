@@ -14,7 +14,7 @@ from vinl.chain.robot import Robot
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.world.endings import FALL, STUCK, SUCCESS, name_late_end
 from vinl.world.free_space import FreeSpace
-from vinl.world.geodesic import distance_field, read_field
+from vinl.world.start_goal import shortest_distance
 
 PATH_EVERY, FILM_EVERY = 5, 2
 """Control steps between two points of the path (0.1 s) and between two poses for a video (0.04 s)."""
@@ -127,6 +127,4 @@ class Recorder:
 
     def _left(self) -> float:
         """Shortest distance to the goal from where the episode ended [m]; zero would be a success."""
-        frame = self._space.plan.frame
-        field = distance_field(self._space.traversable, frame, self._setup.route.goal)
-        return float(read_field(field, frame, self._at))
+        return shortest_distance(self._space, self._at, self._setup.route.goal)

@@ -16,7 +16,7 @@ class Options:
     and report.html."""
 
     policy: str = "nav"
-    """A shipped navigator's name, the folder of a policy or run, or oracle: a follower of short ways."""
+    """A shipped navigator's name, the folder of a policy or run, or oracle: the path follower of vinl eval."""
     out: str | None = None
     """Folder for results.json and report.html (default: runs/eval-nav- and the policy)."""
     floorplans: tuple[str, ...] = ()

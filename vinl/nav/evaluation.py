@@ -8,15 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from jaxtyping import Float
+from torch import Tensor
 
+from vinl.chain.metrics import soft_spl, spl
+from vinl.chain.navigators.base import Task
+from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.nav.config import NavConfig
 from vinl.nav.environment import NavEnvironment
-from vinl.nav.follower import PathFollower
 from vinl.nav.home_store import HomeStore
 from vinl.nav.measures import EpisodeEnd
 from vinl.policies.depth_policy import DepthPolicy
+from vinl.policies.velocity_range import VelocityRange
 from vinl.world.endings import END_REASONS as ALL_REASONS
-from vinl.world.endings import FALL, LOOPING, STUCK, SUCCESS, TIMEOUT
+from vinl.world.endings import FALL, SUCCESS, name_late_end
+from vinl.world.free_space import FreeSpace
+from vinl.world.start_goal import measure_route, shortest_distance
 
 END_REASONS = tuple(reason for reason in ALL_REASONS if reason != FALL)
 """How an episode ends; nothing falls here."""
@@ -40,9 +46,9 @@ class NavRecord:
         end_reason: one of ``END_REASONS``.
         time_s: length [s].
         distance_m: way driven [m].
-        spl, soft_spl: see ``EpisodeEnd``.
+        spl, soft_spl: as in ``vinl eval``, see ``vinl.chain.metrics``.
         collisions: steps that were cancelled because the robot would have touched something.
-        left_m: shortest distance to the goal at the end [m].
+        left_m: shortest distance to the goal at the end [m], by the environment.
     """
 
     kind: str
@@ -82,7 +88,7 @@ class KindResults:
         homes: their names.
         dropped: homes that no episode could be made in.
         reasons: why not, of each.
-        left_out: robots that no start within the range of distances was found for; they are in no figure.
+        left_out: robots that no start within the range of distances was found for, or no path; they are in no figure.
         records, traces: one an episode.
     """
 
@@ -104,6 +110,9 @@ def evaluate_kind(
 ) -> KindResults:
     """One episode for each robot; the same for every policy that is given the same homes and configuration.
 
+    Shortest distances are those of ``vinl eval``, on the floor plan's own grid; the ranges of ``config.episodes`` hold
+    for the coarser ones of the environment.
+
     Args:
         policy: the navigator; None: the oracle.
         kind: name of the kind of homes.
@@ -113,24 +122,16 @@ def evaluate_kind(
     """
     with torch.no_grad():
         environment = NavEnvironment(config, homes, homes.device)
-        n, state = config.num_envs, environment.state
-        begun = {k: state[k].clone() for k in ("home", "position", "yaw", "start_distance", "unplaced")}
-        goals = environment.goals().clone()
-        follower = PathFollower(environment) if policy is None else None
-        if policy is not None:
-            policy.reset(n)
-        over = torch.zeros(n, dtype=torch.bool, device=environment.device)
+        state = environment.state
+        begun = {k: state[k].clone().cpu().numpy() for k in ("home", "position", "yaw", "unplaced")}
+        tasks = _measure_routes(environment)
+        kept = [k for k, task in enumerate(tasks) if np.isfinite(task.route.geodesic_m) and not begun["unplaced"][k]]
+        act = _open_policy(policy, environment) if policy is not None else _open_oracle(tasks, kept, environment)
+        over = torch.zeros(config.num_envs, dtype=torch.bool, device=environment.device)
         figures: EpisodeEnd | None = None
-        paths = [begun["position"]]
+        paths = [state["position"].clone()]
         for step in range(config.episodes.steps):
-            if follower is not None:
-                action = follower.act()
-            else:
-                assert policy is not None
-                depth, vector = environment.observe()
-                metres = depth.float() * policy.camera.far if policy.camera is not None else None
-                action = policy.act(vector, metres)
-            environment.advance(action)
+            environment.advance(act(over))
             end = environment.ended
             assert end is not None
             first = end.counted & ~over
@@ -145,47 +146,85 @@ def evaluate_kind(
         assert figures is not None
         trail = torch.stack(paths, 1).cpu().numpy().astype(np.float64)
         ended = {name: value.cpu().numpy() for name, value in figures._asdict().items()}
-        began = {name: value.cpu().numpy() for name, value in begun.items()}
-        ends = goals.cpu().numpy().astype(np.float64)
-    results = KindResults(
-        kind, [r.name for r in homes.records], homes.dropped, homes.reasons, int((began["unplaced"] > 0).sum()), [], []
-    )
-    for k in range(n):
-        if began["unplaced"][k] > 0:
-            continue
-        home = homes.records[int(began["home"][k])]
-        start, goal = trail[k, 0], ends[k]
+    names, left_out = [r.name for r in homes.records], config.num_envs - len(kept)
+    results = KindResults(kind, names, homes.dropped, homes.reasons, left_out, [], [])
+    for k in kept:
+        home, task, yaw = homes.records[int(begun["home"][k])], tasks[k], float(begun["yaw"][k])
         steps = round(float(ended["steps"][k]))
+        path = trail[k, : steps + 1]
         results.records.append(
-            NavRecord(
-                kind=kind,
-                plan=home.name,
-                episode=k,
-                seed=config.seed,
-                start=(round(float(start[0]), 3), round(float(start[1]), 3)),
-                goal=(round(float(goal[0]), 3), round(float(goal[1]), 3)),
-                yaw=round(float(began["yaw"][k]), 4),
-                straight_m=round(float(np.linalg.norm(goal - start)), 3),
-                geodesic_m=round(float(began["start_distance"][k]), 3),
-                success=bool(ended["success"][k]),
-                end_reason=_reason(ended, k),
-                time_s=steps * config.robot.period,
-                distance_m=round(float(ended["path"][k]), 3),
-                spl=round(float(ended["spl"][k]), 4),
-                soft_spl=round(float(ended["soft_spl"][k]), 4),
-                collisions=round(float(ended["collisions"][k])),
-                left_m=round(float(ended["end_distance"][k]), 3),
-            )
+            _record(kind, config, k, task, yaw, path[-1], {n: v[k].item() for n, v in ended.items()})
         )
-        results.traces.append(NavTrace(trail[k, : steps + 1], home.solid.astype(float), home.blocks.astype(float)))
+        results.traces.append(NavTrace(path, home.solid.astype(float), home.blocks.astype(float)))
     return results
+
+
+def _measure_routes(environment: NavEnvironment) -> list[Task]:
+    """Start and goal of every robot, with the distances that ``vinl eval`` would have; infinite where it finds no
+    path."""
+    records, state = environment.homes.records, environment.state
+    spaces = [FreeSpace(record.restore_plan()) for record in records]
+    starts, goals = (part.cpu().numpy().astype(np.float64) for part in (state["position"], environment.goals()))
+    return [
+        Task(spaces[home], measure_route(spaces[home], start, goal))
+        for home, start, goal in zip(state["home"].tolist(), starts, goals, strict=True)
+    ]
+
+
+def _open_policy(policy: DepthPolicy, environment: NavEnvironment) -> Callable[[Tensor], Tensor]:
+    policy.reset(environment.num_envs)
+
+    def act(over: Tensor) -> Tensor:
+        depth, vector = environment.observe()
+        return policy.act(vector, depth.float() * policy.camera.far if policy.camera is not None else None)
+
+    return act
+
+
+def _open_oracle(tasks: list[Task], kept: list[int], environment: NavEnvironment) -> Callable[[Tensor], Tensor]:
+    """The path follower of ``vinl eval`` for the robots that have a path; the others stay where they are."""
+    robot = environment.config.robot
+    span = VelocityRange((robot.min_speed, robot.max_speed), (-robot.max_yaw_rate, robot.max_yaw_rate))
+    oracle, pose = OracleNavigator(), np.zeros((len(kept), 3))
+    oracle.reset([tasks[k] for k in kept])
+
+    def act(over: Tensor) -> Tensor:
+        here = torch.cat([environment.state["position"], environment.state["yaw"][:, None]], 1).cpu().numpy()[kept]
+        goes_on = ~over.cpu().numpy()[kept]
+        pose[goes_on] = here[goes_on]  # whose episode has ended is elsewhere by now
+        action = torch.zeros(environment.num_envs, 2)
+        action[kept] = torch.as_tensor(span.action(oracle.act({"pose": pose})))
+        return action.to(environment.device)
+
+    return act
+
+
+def _record(
+    kind: str, config: NavConfig, k: int, task: Task, yaw: float, at: np.ndarray, ended: dict[str, float]
+) -> NavRecord:
+    """The record of robot k, which ended ``at`` a place, with the environment's figures of its episode."""
+    route, success, moved = task.route, bool(ended["success"]), ended["path"]
+    left = 0.0 if success else shortest_distance(task.space, at, route.goal)
+    return NavRecord(
+        kind=kind,
+        plan=task.space.plan.name,
+        episode=k,
+        seed=config.seed,
+        start=(round(float(route.start[0]), 3), round(float(route.start[1]), 3)),
+        goal=(round(float(route.goal[0]), 3), round(float(route.goal[1]), 3)),
+        yaw=round(yaw, 4),
+        straight_m=round(route.straight_m, 3),
+        geodesic_m=round(route.geodesic_m, 3),
+        success=success,
+        end_reason=SUCCESS if success else name_late_end(bool(ended["stuck"]), moved, route.geodesic_m),
+        time_s=round(ended["steps"]) * config.robot.period,
+        distance_m=round(moved, 3),
+        spl=round(spl(success, route.geodesic_m, moved), 4),
+        soft_spl=round(soft_spl(route.geodesic_m, left, moved), 4),
+        collisions=round(ended["collisions"]),
+        left_m=round(ended["end_distance"], 3),
+    )
 
 
 def _pick(chosen: torch.Tensor) -> Callable[[torch.Tensor, torch.Tensor], torch.Tensor]:
     return lambda now, before: torch.where(chosen, now, before)
-
-
-def _reason(ended: dict[str, np.ndarray], k: int) -> str:
-    if ended["success"][k]:
-        return SUCCESS
-    return STUCK if ended["stuck"][k] else LOOPING if ended["looping"][k] else TIMEOUT

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
 from scipy.ndimage import label
 
 from vinl.config.errors import InputError
@@ -19,6 +19,7 @@ from vinl.nav.robot_config import CameraConfig
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import RESOLUTION, FloorPlan
+from vinl.world.grid import GridFrame
 from vinl.world.homes.config import layout_config
 from vinl.world.mesh import BOTTOM_TRIANGLES, TOP_TRIANGLES, TRIANGLES_PER_BOX, box_mesh
 
@@ -42,12 +43,37 @@ _LEAST_PAIRS = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class BuiltHome:
-    """One home, ready to be put on the device.
+class HomeRecord:
+    """What the host remembers of a home.
 
     Attributes:
         seed: that it was drawn from.
         name: of the floor plan.
+        frame: of the floor plan's grid.
+        floor: its free cells, eight in a byte.
+        solid: (n, 7) boxes of walls and furniture.
+        blocks: (m, 6) rows of the clutter.
+    """
+
+    seed: int
+    name: str
+    frame: GridFrame
+    floor: UInt8[np.ndarray, " bytes"]
+    solid: Float[np.ndarray, "n 7"]
+    blocks: Float[np.ndarray, "m 6"]
+
+    def restore_plan(self) -> FloorPlan:
+        """The floor plan, as far as paths on it are concerned: furniture counts as wall."""
+        rows, columns = self.frame.shape
+        free = np.unpackbits(self.floor, count=rows * columns).astype(bool).reshape(rows, columns)
+        return FloorPlan(self.name, self.name, Boxes(self.solid.astype(float)), Boxes.empty(), free, free, self.frame)
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltHome(HomeRecord):
+    """One home, ready to be put on the device.
+
+    Attributes:
         origin: of the grids: x and y of the centre of cell [0, 0] [m].
         fields: (rows, columns, goals) distance to each goal [m], infinite where it cannot be reached from.
         clearance: (2 rows, 2 columns) distance to the nearest wall or furniture, up to ``REACH`` [m]; cell [2 r, 2 c]
@@ -55,12 +81,8 @@ class BuiltHome:
         goals: (goals, 2) [m].
         starts: (starts, 2) spots where episodes may begin [m].
         vertices, faces: walls, furniture and blocks; no floor, no ceiling.
-        solid: (n, 7) boxes of walls and furniture, for pictures.
-        blocks: (m, 6) rows of the clutter.
     """
 
-    seed: int
-    name: str
     origin: tuple[float, float]
     fields: Float[np.ndarray, "rows columns goals"]
     clearance: Float[np.ndarray, "fine_rows fine_columns"]
@@ -68,8 +90,6 @@ class BuiltHome:
     starts: Float[np.ndarray, "starts 2"]
     vertices: Float[np.ndarray, "v 3"]
     faces: Int[np.ndarray, "f 3"]
-    solid: Float[np.ndarray, "n 7"]
-    blocks: Float[np.ndarray, "m 6"]
 
     @property
     def cells(self) -> int:
@@ -175,6 +195,10 @@ def prepare_home(plan: FloorPlan, seed: int, config: NavConfig) -> BuiltHome | s
     return BuiltHome(
         seed=seed,
         name=plan.name,
+        frame=plan.frame,
+        floor=np.packbits(plan.free),
+        solid=boxes.rows.astype(np.float32),
+        blocks=blocks.rows.astype(np.float32),
         origin=(float(x0), float(y0)),
         fields=fields,
         clearance=np.ascontiguousarray(fine),
@@ -182,8 +206,6 @@ def prepare_home(plan: FloorPlan, seed: int, config: NavConfig) -> BuiltHome | s
         starts=(to_xy + starts[:, ::-1] * FIELD_RESOLUTION).astype(np.float32),
         vertices=vertices,
         faces=faces,
-        solid=boxes.rows.astype(np.float32),
-        blocks=blocks.rows.astype(np.float32),
     )
 
 
@@ -237,8 +259,3 @@ def _draw_blocks(plan: FloorPlan, rng: np.random.Generator, clutter: ClutterConf
     length, height = rng.uniform(*clutter.length, n), rng.uniform(*clutter.height, n)
     yaw = rng.uniform(-np.pi, np.pi, n)
     return Blocks(np.column_stack([placed, yaw, length, np.full(n, clutter.width), height]))
-
-
-def obstacle_boxes(home: BuiltHome) -> Boxes:
-    """Walls and furniture of a home."""
-    return Boxes(home.solid.astype(np.float64))

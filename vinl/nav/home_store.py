@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import torch
 
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
-from vinl.nav.home_builder import BuiltHome, prepare_home
+from vinl.nav.home_builder import BuiltHome, HomeRecord, prepare_home
 from vinl.nav.home_memory import HomeMemory
 from vinl.nav.home_stream import HomeStream, build_plans, count_workers
 from vinl.sensing.depth import check_device
@@ -23,24 +22,6 @@ _TRIES = 50
 
 _SPARE_ROOM = 1.3
 """A fresh home takes the place of one up to this much larger."""
-
-
-@dataclass(frozen=True, eq=False)
-class HomeRecord:
-    """What the host remembers of a home.
-
-    Attributes:
-        seed, name: see ``BuiltHome``.
-        solid: (n, 7) boxes of walls and furniture.
-        blocks: (m, 6) clutter.
-        goals: (goals, 2) [m].
-    """
-
-    seed: int
-    name: str
-    solid: np.ndarray
-    blocks: np.ndarray
-    goals: np.ndarray
 
 
 class HomeStore:
@@ -276,4 +257,4 @@ class HomeStore:
 
 
 def _record(home: BuiltHome) -> HomeRecord:
-    return HomeRecord(home.seed, home.name, home.solid, home.blocks, home.goals)
+    return HomeRecord(home.seed, home.name, home.frame, home.floor, home.solid, home.blocks)

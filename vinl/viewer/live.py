@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -39,9 +40,8 @@ from vinl.viewer.requests import (
 from vinl.viewer.snapshot import DepthImage, Footholds, Snapshot
 from vinl.viewer.world import World, draw_block, open_home
 from vinl.world.free_space import FreeSpace
-from vinl.world.geodesic import distance_field, read_field
 from vinl.world.readers import load_floorplan
-from vinl.world.start_goal import StartGoal
+from vinl.world.start_goal import measure_route
 
 CONTACT_MEMORY = 6.0
 """Contacts of so many last seconds are shown [s]."""
@@ -250,14 +250,13 @@ class LiveChain:
         if self._state == "fallen":
             raise InputError("the robot has fallen; reset it first")
         goal, space = self._fit(wanted), self._space
-        way = float(read_field(distance_field(space.traversable, space.plan.frame, goal), space.plan.frame, self._xy))
-        if not np.isfinite(way):
-            raise InputError("there is no way to that goal from here")
-        route = StartGoal(self._xy, self._yaw, goal, way, float(np.linalg.norm(goal - self._xy)))
+        route = replace(measure_route(space, self._xy, goal), yaw=self._yaw)
+        if not np.isfinite(route.geodesic_m):
+            raise InputError("there is no path to that goal from here")
         self._navigator.reset([Task(space, route)])
         self._goal, self._state, self._since_goal = goal, "walking", 0
         self._choice = np.zeros((1, 2))
-        return f"goal: {way:.1f} m to walk"
+        return f"goal: {route.geodesic_m:.1f} m to walk"
 
     def _decide(self, goal: Float[np.ndarray, "2"]) -> None:
         """Ask the navigator for the next command."""

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from vinl.config.errors import InputError
 from vinl.world.floorplan import ROOM_TO_STAND, FloorPlan
 from vinl.world.free_space import FIT_RADIUS, FreeSpace
-from vinl.world.geodesic import distance_field
+from vinl.world.geodesic import distance_field, read_field
 
 LEAST_WAY = 1.0
 """A plan without two spots this far apart [m] is refused: the robot would arrive where it starts."""
@@ -96,6 +96,27 @@ def sample_start_goals(
         geodesic = max(float(field[row, column]), straight)
         pairs.append(StartGoal(start, yaw, goal, geodesic, straight, "; ".join(notes)))
     return pairs
+
+
+def measure_route(space: FreeSpace, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]) -> StartGoal:
+    """A start and a goal with their distances, heading 0. The shortest one is infinite where no path leads from one to
+    the other.
+
+    Raises:
+        InputError: the goal is not on floor that the robot can reach.
+    """
+    straight = float(np.linalg.norm(goal - start))
+    return StartGoal(start, 0.0, goal, max(shortest_distance(space, start, goal), straight), straight)
+
+
+def shortest_distance(space: FreeSpace, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]) -> float:
+    """Length of the shortest path [m]; infinite where there is none.
+
+    Raises:
+        InputError: the goal is not on floor that the robot can reach.
+    """
+    frame = space.plan.frame
+    return float(read_field(distance_field(space.traversable, frame, goal), frame, start))
 
 
 def check_way(plan: FloorPlan) -> FloorPlan:
