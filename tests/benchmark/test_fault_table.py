@@ -65,8 +65,7 @@ def test_a_row_changes_its_settings_alone(trotting: LocomotionPolicy) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ("--faults --table", "--faults goes neither"),
-        ("--faults --shard 1/2", "--faults goes neither"),
+        ("--faults --table", "--faults does not go with"),
         ("--faults --rows kp_0.9", "did you mean 'kp_0.8'"),
         ("--faults --faults-file nowhere.yaml", "nowhere.yaml"),
         ("--faults --set faults.kp_scale=0.8", "leave the group faults"),

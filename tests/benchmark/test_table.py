@@ -1,4 +1,4 @@
-"""``vinl eval --table``: rows side by side, rows left out, shares of a table."""
+"""``vinl eval --table``: rows side by side, rows left out, tables put together."""
 
 import json
 import xml.etree.ElementTree as ET
@@ -65,11 +65,13 @@ def test_rows_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
     assert {"table", "row-standing", "row-bare", "failures", "compared", "left-out", "command"} <= ids
     for name in data["rows"]:
         assert (Path("table") / name / "report.html").exists()
-    # a share each, put together, is the same table
-    for k in (1, 2):
-        assert main(["eval", *COMMON.split(), "--out", f"part{k}", "--shard", f"{k}/2"]) == 0
-    assert main(["report", "part2", "part1", "--out", "merged"]) == 0
-    assert read("merged") == data
+    # drawn again from its folder, and put together from two tables of different rows
+    assert main(["report", "table", "--out", "again"]) == 0
+    assert read("again") == data
+    for names in (["standing"], ["trotting", "bare"]):
+        assert main(["eval", *COMMON.split(), "--out", f"only_{names[0]}", "--rows", *names]) == 0
+    assert main(["report", "only_standing", "only_trotting", "--out", "both", "--reference", "trotting"]) == 0
+    assert {**read("both"), "command": 0, "left_out": 0} == {**data, "command": 0, "left_out": 0}
     capsys.readouterr()
     # the same folder again: nothing is walked; another kind of evaluation is refused
     assert main(["eval", *COMMON.split(), "--out", "table"]) == 0

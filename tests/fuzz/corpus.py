@@ -110,7 +110,7 @@ def _configs() -> Iterator[Reader]:
 
 
 def _results(folder: Path) -> Iterator[Reader]:
-    from vinl.benchmark.gather import gather_folders
+    from vinl.benchmark.combine import read_folders
 
     files = {str(f.relative_to(folder)): f.read_bytes() for f in sorted(folder.rglob("*.json*")) if f.is_file()}
     read = {name: data for name, data in files.items() if name in ("run.json", "episodes.jsonl")}
@@ -118,7 +118,7 @@ def _results(folder: Path) -> Iterator[Reader]:
     def damage(data: bytes, rng: Random) -> bytes:
         return mutate.mutate_lines(data, rng) if data == read["episodes.jsonl"] else mutate.mutate_json(data, rng)
 
-    yield Reader("results", read, damage, lambda path: gather_folders([path.parent], path.parent / "out"), files)
+    yield Reader("results", read, damage, lambda path: read_folders([path.parent], path.parent / "out"), files)
 
 
 def _json(tree: Any) -> bytes:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from vinl.benchmark.cluster import join_cluster
 from vinl.benchmark.protocol import Films, Protocol
-from vinl.benchmark.recordings import missing_recordings
 from vinl.benchmark.store import Store
-from vinl.benchmark.work import Row, Shared, cut_jobs, film_job, list_keys, longest_first, missing_films, run_job
+from vinl.benchmark.work import Row, Shared, cut_jobs, film_job, list_keys, longest_first, run_job
 from vinl.chain.choose import check_cameras, check_locomotion_policy, choose_locomotor
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.navigators.base import Navigator
@@ -42,6 +45,7 @@ def evaluate(
     films: Films = "none",
     out: str | Path | None = None,
     on_progress: Callable[[str, int, int], None] | None = None,
+    cluster: str | None = None,
 ) -> Results:
     """Walk through floor plans and measure how it went.
 
@@ -63,9 +67,12 @@ def evaluate(
         out: folder for the films.
         on_progress: called with what is going on, pieces done and pieces in all; by default a bar shows it on a
             terminal and in a notebook.
+        cluster: address of a Ray cluster that walks the episodes in place of this machine, or ``"local"``;
+            ``workers`` are then its CPUs.
 
     Raises:
-        InputError: a name is unknown, a number is out of range, or a plan has no room for an episode.
+        InputError: a name is unknown, a number is out of range, a plan has no room for an episode, or the cluster
+            cannot be reached.
     """
     config = config or EvaluationConfig()
     opened = open_floorplans(floorplans)
@@ -80,100 +87,90 @@ def evaluate(
     protocol = Protocol(name_apart(opened), episodes, range(first_seed, first_seed + seeds), config, films=films)
     folders = [None if out is None else Path(out)]
     if on_progress is not None:
-        return evaluate_rows([row], protocol, workers, folders, on_progress=on_progress)[0]
+        return evaluate_rows([row], protocol, workers, folders, on_progress=on_progress, cluster=cluster)[0]
     with show_line("episodes", "episodes") as show:
 
         def note(what: str, done: int, total: int) -> None:
             if what == "walk":
                 show(done, total)
 
-        return evaluate_rows([row], protocol, workers, folders, on_progress=note)[0]
+        return evaluate_rows([row], protocol, workers, folders, on_progress=note, cluster=cluster)[0]
 
 
 def evaluate_rows(
     rows: Sequence[Row],
     protocol: Protocol,
-    workers: int = 1,
+    workers: int | None = 1,
     folders: Sequence[Path | None] = (),
     keep: bool = False,
     fresh: bool = False,
     command: Sequence[str] = (),
     on_progress: Callable[[str, int, int], None] = lambda *_: None,
+    cluster: str | None = None,
 ) -> list[Results]:
     """Walk the same episodes with several robots; all rows share the workers.
 
     Args:
         rows: who walks.
         protocol: where and by which rules.
-        workers: processes; results do not depend on it.
+        workers: processes; None: one for each CPU. Results do not depend on it.
         folders: one for each row, for its films and, with ``keep``, its episodes; needed for neither: may be left out.
         keep: append every episode that ended to a file in the row's folder, and walk only those that are not there.
         fresh: forget what the folders hold of earlier runs.
         command: kept in the folders beside the episodes.
         on_progress: called with what is going on, pieces done and pieces in all.
+        cluster: address of a Ray cluster that walks the episodes, see ``join_cluster``; None: this machine does.
 
     Raises:
-        InputError: a policy is no locomotor, a plan has no room for an episode, or a folder holds another evaluation.
+        InputError: a policy is no locomotor, a plan has no room for an episode, a folder holds another evaluation, or
+            the cluster cannot be reached.
     """
     for row in rows:
         check_locomotion_policy(row.locomotor)
         check_cameras(row.locomotor, row.navigator)
-    began, workers = time.perf_counter(), max(workers, 1)
-    where: Sequence[Path | None] = folders or [None] * len(rows)
-    routes = []
-    for k, plan in enumerate(protocol.plans):
-        on_progress("plan", k, len(protocol.plans))
-        routes.append(protocol.find_routes(plan))
-    wanted = list_keys(protocol.plans, protocol.episodes, protocol.seeds, protocol.shard)
-    if not wanted:
-        raise InputError(f"--shard {protocol.shard}: there are not so many episodes; take fewer shards")
-    stores: list[Store] = []
-    try:
-        for row, folder in zip(rows, where, strict=True):
-            stores.append(Store(row, protocol, folder, keep, fresh, command))
+    began, where = time.perf_counter(), folders or [None] * len(rows)
+    with contextlib.ExitStack() as stack:
+        joined = None if cluster is None else stack.enter_context(join_cluster(cluster, workers))
+        here = workers or os.cpu_count() or 1
+        workers = here if joined is None else joined.workers
+        routes = []
+        for k, plan in enumerate(protocol.plans):
+            on_progress("plan", k, len(protocol.plans))
+            routes.append(protocol.find_routes(plan))
+        wanted = list_keys(protocol.plans, protocol.episodes, protocol.seeds)
+        stores = [
+            stack.enter_context(contextlib.closing(Store(row, protocol, folder, keep, fresh, command)))
+            for row, folder in zip(rows, where, strict=True)
+        ]
         jobs = []
         for k, (row, store) in enumerate(zip(rows, stores, strict=True)):
-            known = where[k] if store.journal is not None and store.journal.resumed else None
-            filmed = missing_films(wanted, protocol.films, protocol.seeds[0], folder=known)
-            unrecorded = missing_recordings(wanted, known) if protocol.record else set()
-            missing = [key for key in wanted if key not in store.done or key in filmed or key in unrecorded]
+            missing, filmed = store.find_missing(wanted)
             if store.journal is not None and missing:
                 store.journal.begin(workers)
             jobs += cut_jobs(k, row, protocol.plans, routes, wanted, missing, filmed, workers)
-        todo = sum(len(job.cells) for job in jobs)
-        total, done = len(wanted) * len(rows), len(wanted) * len(rows) - todo
+        jobs = longest_first(jobs, routes)
+        total = len(wanted) * len(rows)
+        walked = itertools.count(total - sum(len(job.cells) for job in jobs) + 1)
 
         def add(row: int, episode: Episode) -> None:
-            nonlocal done
             stores[row].add(episode, time.perf_counter() - began)
-            done += 1
-            on_progress("walk", done, total)
+            on_progress("walk", next(walked), total)
 
-        on_progress("walk", done, total)
-        jobs = longest_first(jobs, routes)
+        on_progress("walk", total - sum(len(job.cells) for job in jobs), total)
         shared = Shared(rows, protocol.plans, routes, protocol.config, protocol.record)
-        with WorkerPool(min(workers, max(len(jobs), 1)), shared) as pool:
-            units = pool.run(run_job, jobs, add)
-            shots = [
-                FilmJob(protocol.plans[job.plan], episode, str(where[job.row]))
-                for job, unit in zip(jobs, units, strict=True)
-                for episode in unit.values()
-            ]
-            if shots:
-                shown = 0
-
-                def count() -> None:
-                    nonlocal shown
-                    shown += 1
-                    on_progress("film", shown, len(shots))
-
-                on_progress("film", 0, len(shots))
-                pool.run(film_job, shots, count)
+        pool = stack.enter_context(WorkerPool(min(here, max(len(jobs), 1)), shared))  # it starts at the first run
+        units = pool.run(run_job, jobs, add) if joined is None else joined.run(shared, run_job, jobs, add)
+        shots = [
+            FilmJob(protocol.plans[job.plan], episode, str(where[job.row]))
+            for job, unit in zip(jobs, units, strict=True)
+            for episode in unit.values()
+        ]
+        if shots:  # films are files of this machine, whatever machine walked
+            shown = itertools.count(1)
+            on_progress("film", 0, len(shots))
+            pool.run(film_job, shots, lambda: on_progress("film", next(shown), len(shots)))
         wall = time.perf_counter() - began
-        return [store.results(wanted, wall) for store in stores]
-    finally:
-        for store in stores:
-            store.close()
+        return [store.results(wanted, wall, workers) for store in stores]
 
 
 def name_apart(plans: Sequence[FloorPlan]) -> list[FloorPlan]:

@@ -10,10 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from vinl.benchmark.journal import RUN_FILE
-from vinl.benchmark.merge import TABLE_FILE
 from vinl.benchmark.report import write_report
 from vinl.benchmark.results_file import results_as_dict
-from vinl.benchmark.shard import Shard
 from vinl.benchmark.table import TableRow, summarise_table
 from vinl.benchmark.table_config import PaperFigures, RowConfig, TableConfig
 from vinl.benchmark.table_report import write_table_report
@@ -22,14 +20,12 @@ from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.config.output import write_json
 
-RESULTS_FILE, REPORT_FILE = "results.json", "report.html"
+RESULTS_FILE, REPORT_FILE, TABLE_FILE = "results.json", "report.html", "table.json"
 
 
-def write_run(
-    out: Path, results: Results, command: Sequence[str], workers: int | None = None, shard: Shard | None = None
-) -> None:
+def write_run(out: Path, results: Results, command: Sequence[str]) -> None:
     """``results.json`` and ``report.html`` of one row."""
-    write_json(out / RESULTS_FILE, results_as_dict(results, command, workers, shard))
+    write_json(out / RESULTS_FILE, results_as_dict(results, command))
     write_report(out / REPORT_FILE, results, shlex.join(command))
 
 
@@ -39,8 +35,6 @@ def write_table(
     reference: str,
     left_out: Mapping[str, str],
     command: Sequence[str],
-    workers: int | None = None,
-    shard: Shard | None = None,
 ) -> dict[str, Any]:
     """The files of every row in its folder, and the table's beside them.
 
@@ -48,15 +42,15 @@ def write_table(
         What the table's ``results.json`` holds.
     """
     for row in rows:
-        write_run(out / row.name, row.results, row.command or command, workers, shard)
-    data = summarise_table(rows, reference, left_out, command, shard)
+        write_run(out / row.name, row.results, row.command or command)
+    data = summarise_table(rows, reference, left_out, command)
     write_json(out / RESULTS_FILE, data)
     write_table_report(out / REPORT_FILE, data)
     return data
 
 
 def keep_table(out: Path, table: TableConfig, left_out: Mapping[str, str], command: Sequence[str]) -> None:
-    """Say in the folder which rows there are, so that shares of them can be put together."""
+    """Say in the folder which rows there are, so that the report can be drawn again."""
     rows = {name: {"title": row.title, "paper": _plain(row.paper)} for name, row in table.rows.items()}
     about = {"command": list(command), "reference": table.reference, "rows": rows, "left_out": dict(left_out)}
     write_json(out / TABLE_FILE, {"schema": 1, **about})

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from vinl.benchmark.routes import describe_routes
-from vinl.benchmark.shard import Shard
 from vinl.benchmark.work import Row
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_routes
@@ -28,7 +27,6 @@ class Protocol:
         episodes: start/goal pairs a plan; the same for all seeds.
         seeds: repetitions; a seed changes clutter, heading and joint angles at the start.
         config: limits and rules.
-        shard: which share of the episodes is walked.
         films: which episodes are filmed: none, the first of every plan, or all of the first seed.
         record: keep the poses of all episodes in files, see ``recordings``.
         routes: start/goal pairs of one's own for every plan, ``episodes`` each, see ``routes``; None: they are drawn.
@@ -38,7 +36,6 @@ class Protocol:
     episodes: int = 10
     seeds: range = range(5)
     config: EvaluationConfig = field(default_factory=EvaluationConfig)
-    shard: Shard = field(default_factory=Shard)
     films: Films = "none"
     routes: Mapping[str, Sequence[StartGoal]] | None = None
     record: bool = False

@@ -6,19 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from vinl.benchmark.metrics import aggregate_episodes
-from vinl.benchmark.shard import Shard
 from vinl.chain.records import Results, plain_record
 from vinl.config.output import SCHEMA
 from vinl.config.versions import describe_environment
 
 
-def results_as_dict(
-    results: Results, command: Sequence[str], workers: int | None = None, shard: Shard | None = None
-) -> dict[str, Any]:
-    """Results as plain data. Two runs with the same seed differ in ``timing`` and ``aggregate.wall_seconds`` only.
-
-    A share of the episodes says so in ``shard``; the whole has no such key.
-    """
+def results_as_dict(results: Results, command: Sequence[str]) -> dict[str, Any]:
+    """Results as plain data. Two runs with the same seed differ in ``timing`` and ``aggregate.wall_seconds`` only."""
     records = results.records
     min_metres = results.config["evaluation"]["min_metres"]
     plans = [
@@ -34,12 +28,11 @@ def results_as_dict(
     return {
         "schema": SCHEMA,
         "command": list(command),
-        **({"shard": str(shard)} if shard is not None and shard.count > 1 else {}),
         "config": results.config,
         "policies": results.policies,
         "environment": describe_environment(),
         "plans": plans,
         "aggregate": {**results.aggregate, "wall_seconds": wall},
         "episodes": [plain_record(r) for r in records],
-        "timing": {"wall_seconds": wall, "workers": workers},
+        "timing": {"wall_seconds": wall, "workers": results.workers},
     }

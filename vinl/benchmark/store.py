@@ -9,7 +9,7 @@ from vinl.benchmark.describe import describe_navigator, describe_plan
 from vinl.benchmark.journal import Journal, read_wall_seconds
 from vinl.benchmark.metrics import aggregate_episodes
 from vinl.benchmark.protocol import Protocol
-from vinl.benchmark.recordings import forget_recordings, without_poses, write_recording
+from vinl.benchmark.recordings import forget_recordings, missing_recordings, without_poses, write_recording
 from vinl.benchmark.work import Row, missing_films
 from vinl.chain.records import Episode, Key, Results
 from vinl.config.versions import list_packages
@@ -43,12 +43,21 @@ class Store:
                 "policies": self._policies,
                 "packages": list_packages(),
                 "plans": [describe_plan(plan) for plan in protocol.plans],
-                "shard": str(protocol.shard),
             }
             self.journal = Journal(folder, about, protocol.plans, fresh)
             if fresh:
                 forget_recordings(folder)
             self.done = self.journal.done
+
+    def find_missing(self, wanted: Sequence[Key]) -> tuple[list[Key], set[Key]]:
+        """The episodes that are to be walked, and those of them that are to be filmed.
+
+        An episode that is there is walked again if its film or its recording is not.
+        """
+        known = self._folder if self.journal is not None and self.journal.resumed else None
+        filmed = missing_films(wanted, self._protocol.films, self._protocol.seeds[0], folder=known)
+        again = filmed | (missing_recordings(wanted, known) if self._protocol.record else set())
+        return [key for key in wanted if key not in self.done or key in again], filmed
 
     def add(self, episode: Episode, wall: float) -> None:
         """An episode ended ``wall`` seconds after the beginning."""
@@ -60,7 +69,7 @@ class Store:
         else:
             self.done[episode.record.key] = episode
 
-    def results(self, wanted: Sequence[Key], wall: float) -> Results:
+    def results(self, wanted: Sequence[Key], wall: float, workers: int) -> Results:
         """The whole row. ``wall``: how long it took, unless the folder knows of earlier sessions [s]."""
         protocol, done = self._protocol, [self.done[key] for key in wanted]
         aggregate = aggregate_episodes([e.record for e in done], protocol.config.min_metres)
@@ -71,7 +80,7 @@ class Store:
         if protocol.films != "none" and self._folder is not None:
             chosen = missing_films(wanted, protocol.films, protocol.seeds[0], folder=None)
             videos = [name_film(*key) for key in wanted if key in chosen]
-        return Results(done, aggregate, list(protocol.plans), self._policies, self._config, wall, videos)
+        return Results(done, aggregate, list(protocol.plans), self._policies, self._config, wall, videos, workers)
 
     def close(self) -> None:
         """Let others write to the folder."""

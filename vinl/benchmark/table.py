@@ -9,7 +9,6 @@ from typing import Any
 
 from vinl.benchmark.metrics import aggregate_episodes
 from vinl.benchmark.paired import compare_rows
-from vinl.benchmark.shard import Shard
 from vinl.benchmark.table_config import PaperFigures
 from vinl.chain.records import Results
 from vinl.config.output import SCHEMA
@@ -43,7 +42,6 @@ def summarise_table(
     reference: str,
     left_out: Mapping[str, str],
     command: Sequence[str],
-    shard: Shard | None = None,
 ) -> dict[str, Any]:
     """The table as plain data, without the episodes: small enough to be kept beside the code.
 
@@ -52,14 +50,12 @@ def summarise_table(
         reference: name of the row that the report compares with.
         left_out: rows that were not walked, and why.
         command: that made it.
-        shard: which share of the episodes it is.
     """
     config = {key: value for key, value in rows[0].results.config.items() if key != "obstacles"}
     min_metres = config["evaluation"]["min_metres"]
     return {
         "schema": SCHEMA,
         "command": list(command),
-        **({"shard": str(shard)} if shard is not None and shard.count > 1 else {}),
         "config": config,
         "environment": describe_environment(),
         "plans": [{"name": plan.name, "area_m2": round(plan.area_m2, 2)} for plan in rows[0].results.plans],

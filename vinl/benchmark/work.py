@@ -1,4 +1,4 @@
-"""What is to be done: which episodes there are, whose share they are, and how they are cut into pieces of work."""
+"""What is to be done: which episodes there are, and how they are cut into pieces of work."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TypeVar
 
-from vinl.benchmark.shard import Shard
 from vinl.chain.batching import is_steady, is_steady_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_setup
@@ -76,10 +75,9 @@ class Job:
     at_once: bool = False
 
 
-def list_keys(plans: Sequence[FloorPlan], episodes: int, seeds: range, shard: Shard | None = None) -> list[Key]:
-    """All episodes of a row in the order of the results, or those of a share."""
-    keys = [(plan.name, seed, k) for plan in plans for seed in seeds for k in range(episodes)]
-    return [key for number, key in enumerate(keys) if (shard or Shard()).holds(number)]
+def list_keys(plans: Sequence[FloorPlan], episodes: int, seeds: range) -> list[Key]:
+    """All episodes of a row in the order of the results."""
+    return [(plan.name, seed, k) for plan in plans for seed in seeds for k in range(episodes)]
 
 
 def cut_jobs(

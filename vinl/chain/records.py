@@ -125,6 +125,7 @@ class Results:
         config: everything that the run depends on.
         wall_seconds: how long it took [s].
         videos: files that were written.
+        workers: that walked it; None: it was read from a folder.
     """
 
     episodes: list[Episode]
@@ -134,6 +135,7 @@ class Results:
     config: dict[str, Any]
     wall_seconds: float
     videos: list[str] = field(default_factory=list)
+    workers: int | None = None
 
     @property
     def records(self) -> list[EpisodeRecord]:

@@ -11,7 +11,7 @@ from vinl.config.errors import InputError
 
 COMMANDS = {
     "eval": ("vinl.cli.eval", "the whole chain in MuJoCo: a robot crosses floor plans; report, figures, video"),
-    "report": ("vinl.cli.report", "put folders of vinl eval together: shares, rows, tables; draw the report again"),
+    "report": ("vinl.cli.report", "draw the report of a folder again, or of several side by side"),
     "eval-loco": ("vinl.cli.eval_loco", "a locomotion policy alone in MuJoCo: bars, litter, random commands"),
     "eval-nav": ("vinl.cli.eval_nav", "a navigation policy alone, in homes that it has never seen"),
     "train-loco": ("vinl.cli.train_loco", "train a locomotion policy (needs the train extra)"),

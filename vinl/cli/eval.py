@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from vinl.benchmark.protocol import Protocol
     from vinl.benchmark.work import Row
     from vinl.chain.config import EvaluationConfig
-    from vinl.cli.progress import Progress
+    from vinl.chain.records import Results
 
 
 @dataclass(frozen=True)
@@ -71,10 +70,10 @@ class Options:
     record: bool = False
     """Keep the poses of all episodes, about 1 kB for each second, for vinl play --replay."""
     workers: int | None = None
-    """Processes; the number of cores by default. Results do not depend on it."""
-    shard: str = "1/1"
-    """Which share of the episodes is walked here, for example 2/5: the second of five. ``vinl report`` puts the folders
-    of all shares together."""
+    """Processes; the number of cores by default, on a cluster that of all its CPUs. Results do not depend on it."""
+    cluster: str | None = None
+    """Walk on a Ray cluster: its address (host:port, ray://host:port, auto), or local for one that is started here;
+    needs the cluster extra. Results do not depend on it where processors and versions are the same."""
     fresh: bool = False
     """Begin anew: forget what an earlier run left in the folder. Otherwise the same command goes on where it was
     interrupted."""
@@ -102,7 +101,6 @@ def main(argv: list[str]) -> int:
     from vinl.benchmark.outputs import check_folder
     from vinl.benchmark.protocol import Films, Protocol
     from vinl.benchmark.routes import read_routes
-    from vinl.benchmark.shard import Shard
     from vinl.chain.choose import best_locomotor
     from vinl.chain.navigators.choose import best_navigator
     from vinl.cli.kinds import check_config
@@ -117,13 +115,14 @@ def main(argv: list[str]) -> int:
         else (options.loco or best_locomotor(), options.nav or best_navigator())
     )
     out = check_out(default_out("eval", *who) if options.out is None else options.out)
-    workers = os.cpu_count() or 1 if options.workers is None else options.workers
     films: Films = "all" if options.video_all else "first" if options.video else "none"
+    workers = 1 if options.workers is None else options.workers
     check_numbers(options.episodes, options.seeds, options.first_seed, options.obstacles or "paper", workers)
-    if options.faults and (options.table or options.shard != "1/1"):
-        raise InputError("--faults goes neither with --table nor with --shard; evaluate them one after the other")
+    if options.faults and options.table:
+        raise InputError("--faults does not go with --table; evaluate them one after the other")
+    if options.cluster is not None and options.device == "cuda":
+        raise InputError("--cluster asks policies on CPUs; leave --device cuda out")
     check_folder(out, options.table or options.faults)
-    shard = Shard.parse(options.shard)
     check_config(options.config, "evaluation")
     config = _load_rules(options)
 
@@ -136,18 +135,17 @@ def main(argv: list[str]) -> int:
         if options.routes is not None:
             routes = read_routes(Path(options.routes), named)
             episodes = len(next(iter(routes.values())))
-        return Protocol(named, episodes, seeds, config, shard, films, routes, options.record)
+        return Protocol(named, episodes, seeds, config, films, routes, options.record)
 
     command = ["vinl", "eval", *strip_command(argv)]
     run = _run_table if options.table else _run_faults if options.faults else _run_one
-    run(options, out, prepare, workers, command)
+    run(options, out, prepare, command)
     return 0
 
 
-def _run_one(options: Options, out: Path, prepare: Callable[[], Protocol], workers: int, command: list[str]) -> None:
+def _run_one(options: Options, out: Path, prepare: Callable[[], Protocol], command: list[str]) -> None:
     from rich.console import Console
 
-    from vinl.benchmark.evaluate import evaluate_rows
     from vinl.benchmark.outputs import write_run
     from vinl.benchmark.summary import print_summary
 
@@ -155,16 +153,14 @@ def _run_one(options: Options, out: Path, prepare: Callable[[], Protocol], worke
         raise InputError("--rows and --strict belong to a table; give --table (or --faults, which has rows) too")
     row = _load_single(options)
     protocol, console = prepare(), Console()
-    with _progress(console, out) as progress:
-        results = evaluate_rows([row], protocol, workers, [out], True, options.fresh, command, progress.show)[0]
-    write_run(out, results, command, workers, protocol.shard)
+    results = _walk([row], protocol, [out], options, command, console, out)[0]
+    write_run(out, results, command)
     print_summary(console, results, out)
 
 
-def _run_faults(options: Options, out: Path, prepare: Callable[[], Protocol], workers: int, command: list[str]) -> None:
+def _run_faults(options: Options, out: Path, prepare: Callable[[], Protocol], command: list[str]) -> None:
     from rich.console import Console
 
-    from vinl.benchmark.evaluate import evaluate_rows
     from vinl.benchmark.fault_table import FaultMatrix, print_faults, summarise_faults
     from vinl.benchmark.outputs import RESULTS_FILE, write_run
     from vinl.config.loader import load_config
@@ -179,20 +175,18 @@ def _run_faults(options: Options, out: Path, prepare: Callable[[], Protocol], wo
         raise InputError("--faults tries one fault at a time; leave the group faults of the config as it is")
     rows = [replace(row, settings=settings) for settings in faults.values()]
     folders = [out / name for name in faults]
-    with _progress(console, out) as progress:
-        results = evaluate_rows(rows, protocol, workers, folders, True, options.fresh, command, progress.show)
+    results = _walk(rows, protocol, folders, options, command, console, out)
     for folder, one in zip(folders, results, strict=True):
-        write_run(folder, one, command, workers)
+        write_run(folder, one, command)
     data = summarise_faults(faults, results, command, protocol.config.min_metres)
     write_json(out / RESULTS_FILE, data)
     print_faults(console, data)
     console.print(f"figures {out / RESULTS_FILE}, each fault's in the folder of its name", soft_wrap=True)
 
 
-def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], workers: int, command: list[str]) -> None:
+def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], command: list[str]) -> None:
     from rich.console import Console
 
-    from vinl.benchmark.evaluate import evaluate_rows
     from vinl.benchmark.outputs import keep_table, leave_out, write_table
     from vinl.benchmark.table import TableRow
     from vinl.benchmark.table_config import TableConfig
@@ -216,13 +210,12 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], wor
     out.mkdir(parents=True, exist_ok=True)
     keep_table(out, table, left_out, command)
     folders = [out / name for name in present]
-    with _progress(console, out) as progress:
-        done = evaluate_rows(loaded, protocol, workers, folders, True, options.fresh, command, progress.show)
+    done = _walk(loaded, protocol, folders, options, command, console, out)
     rows = [
         TableRow(name, row.title, results, row.paper)
         for (name, row), results in zip(present.items(), done, strict=True)
     ]
-    print_table(console, write_table(out, rows, reference, left_out, command, workers, protocol.shard), out)
+    print_table(console, write_table(out, rows, reference, left_out, command), out)
 
 
 def _load_single(options: Options) -> Row:
@@ -257,7 +250,19 @@ def _load_rules(options: Options) -> EvaluationConfig:
     return load_config(EvaluationConfig, options.config, [*errors, *options.overrides])
 
 
-def _progress(console: Console, out: Path) -> Progress:
+def _walk(
+    rows: list[Row],
+    protocol: Protocol,
+    folders: list[Path],
+    options: Options,
+    command: list[str],
+    console: Console,
+    out: Path,
+) -> list[Results]:
+    from vinl.benchmark.evaluate import evaluate_rows
     from vinl.cli.progress import Progress
 
-    return Progress(console, f"{out} keeps them; the same command goes on from there")
+    with Progress(console, f"{out} keeps them; the same command goes on from there") as progress:
+        return evaluate_rows(
+            rows, protocol, options.workers, folders, True, options.fresh, command, progress.show, options.cluster
+        )

@@ -1,4 +1,4 @@
-"""``vinl report``: folders of ``vinl eval`` put together, and their report drawn again."""
+"""``vinl report``: the report of folders of ``vinl eval`` drawn again, several side by side."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from vinl.cli.options import parse_options
 
 @dataclass(frozen=True)
 class Options:
-    """Put folders of vinl eval together (shares of the episodes, rows of a table, whole tables) and draw the report
-    again: results.json and report.html. Nothing is walked."""
+    """Draw the report of a folder of vinl eval again, or of several folders side by side as a table: results.json and
+    report.html. Nothing is walked."""
 
     folders: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Folders that vinl eval wrote."""
@@ -25,11 +25,11 @@ class Options:
 
 
 def main(argv: list[str]) -> int:
-    """Merge, write, print."""
+    """Read, write, print."""
     options = parse_options(Options, argv, "report")
     from rich.console import Console
 
-    from vinl.benchmark.gather import gather_folders
+    from vinl.benchmark.combine import read_folders
     from vinl.benchmark.outputs import write_run, write_table
     from vinl.benchmark.summary import print_summary
     from vinl.benchmark.table_report import print_table
@@ -39,7 +39,7 @@ def main(argv: list[str]) -> int:
         check_out(options.out or (options.folders[0] if len(options.folders) == 1 else "runs/report")),
         Console(),
     )
-    found = gather_folders([Path(folder) for folder in options.folders], out, options.reference)
+    found = read_folders([Path(folder) for folder in options.folders], out, options.reference)
     if found.is_table:
         print_table(console, write_table(out, found.rows, found.reference, found.left_out, found.command), out)
     else:

@@ -14,12 +14,12 @@ from vinl.config.errors import InputError
 SCHEMA = 1
 """Version of ``results.json``. Names stay; new ones may be added without a new version."""
 
-_IDLE, _IDLE_FLAGS = ("--out", "--workers", "--shard"), ("--fresh", "--record")
+_IDLE, _IDLE_FLAGS = ("--out", "--workers", "--cluster"), ("--fresh", "--record")
 """Options, with a value and without, that are left out of the command."""
 
 
 def strip_command(argv: Sequence[str]) -> list[str]:
-    """A command line without what no figure depends on, or what says only which part of them is measured."""
+    """A command line without what no figure depends on."""
     kept: list[str] = []
     words = iter(argv)
     for word in words:
