@@ -76,7 +76,7 @@ class CueTask:
 def build(n=64, image=False, image_type="float16", rate=3e-3, peers=None, hidden=0, **settings):
     model = RecurrentActorCritic(ToyActor(image), guesses=hidden)
     state = model.actor.initial_state(n)
-    storage = RecurrentStorage(STEPS, n, model.actor.image, image_type, 1, 0, 1, state, "cpu", hidden)
+    storage = RecurrentStorage(STEPS, n, model.actor.image, image_type, 1, 1, state, "cpu", hidden)
     return RecurrentPPO(model, storage, DeviceRate(rate), PpoConfig(**settings), peers)
 
 
@@ -111,7 +111,7 @@ def test_it_learns_what_only_memory_solves(image, image_type):
 
 def test_the_feature_learns_to_tell_what_is_hidden_without_any_reward():
     torch.manual_seed(3)
-    algorithm = build(hidden=2, way=1.0, entropy=0.0, value=0.0)
+    algorithm = build(hidden=2, places=1.0, entropy=0.0, value=0.0)
     task = CueTask(64, False)
     task.step = lambda action, step=task.step: (lambda o, r, d, e: (o, 0 * r, d, e))(*step(action))
     _, first = learn(algorithm, task, 1)

@@ -61,18 +61,17 @@ def run_nav(
         "steps_per_second": _measure(NavEnvironment(config, store, device), seconds),
         "blind_steps_per_second": _measure(NavEnvironment(replace(config, camera=None), store, device), seconds / 2),
         **({} if on_gpu else _measure_single(config, store, seconds / 2)),
-        "homes_per_second": (homes + store.dropped) / built,
+        "homes_per_second": (homes + len(store.reasons)) / built,
         "homes_per_cpu_second": _measure_building(config),
         "home_kilobytes": store.memory_bytes / homes / 1e3,
         "homes": homes,
-        "dropped": store.dropped,
+        "dropped": len(store.reasons),
         "num_envs": num_envs,
         "image": "none" if camera is None else f"{camera.width} x {camera.height}",
         "device": torch.cuda.get_device_name(device) if on_gpu else "cpu",
     }
     if on_gpu:
         figures["device_gigabytes"] = (_device_bytes(device) - used) / 1e9
-    store.close()
     return figures
 
 

@@ -21,7 +21,7 @@ class HomesConfig:
 
     Attributes:
         count: homes at one time.
-        seed: of the first home; with ``fresh`` above 0, later seeds follow.
+        seed: of the first home.
         generator: what generated homes are like.
         plans: floor-plan files or names to train in beside the generated homes, see ``vinl.world.readers``; a range
             of a JSON file's plans as ``FILE:0-49``.
@@ -32,7 +32,6 @@ class HomesConfig:
         starts: spots in each home that starts are drawn from.
         path_radius: ways to the goal keep this distance from walls and furniture [m] [paper: agent radius 0.22].
         start_clearance, goal_clearance: starts and goals keep this distance from walls and furniture [m].
-        fresh: share of the homes that is replaced by fresh ones in 1,000 steps of every robot; 0: never.
         workers: processes that build homes; null: one for each core but one. 0: none, all is built in place.
     """
 
@@ -47,7 +46,6 @@ class HomesConfig:
     path_radius: float = 0.22
     start_clearance: float = 0.3
     goal_clearance: float = 0.3
-    fresh: float = 0.0
     workers: int | None = None
 
     def __post_init__(self) -> None:
@@ -67,7 +65,6 @@ class HomesConfig:
         check_number("homes.path_radius", self.path_radius, 0.1, 1.0)
         check_number("homes.start_clearance", self.start_clearance, 0.0, 2.0)
         check_number("homes.goal_clearance", self.goal_clearance, 0.0, 2.0)
-        check_number("homes.fresh", self.fresh)
         if self.workers is not None and self.workers < 0:
             raise InputError(f"homes.workers must not be negative, got {self.workers}")
 
@@ -137,7 +134,6 @@ class RewardConfig:
         progress: for each metre that the geodesic distance shrinks.
         slack: every step.
         collision: every step that is cancelled because the robot would touch something.
-        block: every step that ends above a block, which the legs then have to step over (``clutter``).
         scale: multiplies the sum.
     """
 
@@ -145,7 +141,6 @@ class RewardConfig:
     progress: float = 1.0
     slack: float = -0.002
     collision: float = -0.003
-    block: float = 0.0
     scale: float = 1.0
 
     def __post_init__(self) -> None:
@@ -200,5 +195,3 @@ class NavConfig:
             raise InputError("camera.missing=plane needs ppo.image_type=float16: a byte has no room for the mark")
         if self.network.places and self.previous == "action":
             raise InputError("network.places needs previous=motion or both: the map follows the robot's own motion")
-        if self.execution.snag > 0 and self.robot.min_speed >= 0:
-            raise InputError("execution.snag needs a way back: set robot.min_speed below 0")

@@ -18,7 +18,6 @@ from vinl.nav.motion_kernels import measure_robots, move_robots, place_robots
 from vinl.nav.robots import make_robots
 from vinl.nav.rules import write_rules
 from vinl.nav.view_kernels import aim_cameras, draw_keys, render_interior
-from vinl.nav.way_kernel import point_ways
 from vinl.policies.places import blank_places, view_places, visit_places
 from vinl.robot.cameras import Camera
 from vinl.sensing.depth import check_device
@@ -44,7 +43,7 @@ class NavStep(NamedTuple):
             where done.
         reward: (n,) float32.
         done: (n,) bool, an episode ended with this step.
-        timeout: (n,) bool, it ended for want of time (or because its home was replaced), not at the goal.
+        timeout: (n,) bool, it ended for want of time, not at the goal.
     """
 
     depth: Float[Tensor, "n height width"]
@@ -151,13 +150,6 @@ class NavEnvironment:
         """Geodesic distance to the goal [m]; what the robots themselves do not know. Changes with the next step."""
         return self.state["distance"]
 
-    def find_ways(self) -> Float[Tensor, "n 2"]:
-        """Where the shortest way leads over the next 0.8 m: a unit vector in each robot's frame (forward, left), zero
-        at the goal. The robots themselves do not know it."""
-        way = self._zeros(self.num_envs, 2)
-        self._launch(point_ways, self.num_envs, [self.homes.homes, self._robots, wp.from_torch(way, dtype=wp.vec2)])
-        return way
-
     def find_places(self) -> Float[Tensor, "n view"]:
         """Where in the 4 m around them the robots have been lately, see ``view_places``.
 
@@ -172,9 +164,8 @@ class NavEnvironment:
         """Means over the episodes that ended since the last call (``success``, ``spl``, ``soft_spl``, ``collisions``,
         ``steps``, ``path`` and ``start_distance``, ``end_distance`` [m], shares that were ``stuck``, ``looping``,
         ``out_of_time``; absent if none ended), their number ``episodes``; over all steps ``reward``, the share
-        ``blocked``, ``step_length`` [m] and, where ``reward.block`` counts, the share ``above_blocks``; and how many
-        were ``evicted`` because their home was replaced, or
-        ``unplaced``: started off the range of distances, because no start within it was found. The host waits here."""
+        ``blocked``, ``step_length`` [m]; and how many were ``unplaced``: started off the range of distances, because no
+        start within it was found. The host waits here."""
         return self._measures.read(self.state["unplaced"])
 
     def save_state(self) -> dict[str, Any]:
@@ -183,7 +174,7 @@ class NavEnvironment:
         return {"robots": tensors, "homes": self.homes.save_state()}
 
     def load_state(self, state: dict[str, Any]) -> None:
-        """Go on from a saved state. If the homes are other ones, because fresh ones had come, all robots begin anew.
+        """Go on from a saved state. If the homes are other ones, all robots begin anew.
 
         Raises:
             InputError: the state is of another number of robots.
@@ -191,10 +182,9 @@ class NavEnvironment:
         saved = state["robots"]
         if saved.keys() != self.state.keys() or len(saved["home"]) != self.num_envs:
             raise InputError(f"the saved state is of {len(saved.get('home', ()))} robots, not {self.num_envs}")
-        if self.homes.holds(state["homes"]):
+        if self.homes.save_state() == state["homes"]:
             for name, tensor in saved.items():
                 self.state[name].copy_(tensor)
-            self.state["generation"].copy_(self.homes.generations()[self.state["home"].long()])
         else:
             self.state["chance"].copy_(saved["chance"])
             self._start(torch.ones(self.num_envs, dtype=torch.bool, device=self.device))
@@ -212,10 +202,8 @@ class NavEnvironment:
             reward, done and timeout, as in ``NavStep``.
         """
         state, rules = self.state, self.config.reward
-        self.homes.refresh()
         state["action"].copy_(action.detach()).clamp_(-1.0, 1.0)
         state["chance"][1] += 1
-        evicted = state["generation"] != self.homes.generations()[state["home"].long()]
         before, place = state["distance"].clone(), state["position"].clone()
         self._launch(
             move_robots,
@@ -231,20 +219,13 @@ class NavEnvironment:
         state["in_a_row"].add_(1).mul_(self._blocked)
         episodes = self.config.episodes
         success = (self._straight < episodes.success_radius) & (state["distance"] < episodes.success_geodesic)
-        success &= ~evicted
-        timeout = ((state["steps"] >= episodes.steps) & ~success) | evicted
+        timeout = (state["steps"] >= episodes.steps) & ~success
         done = success | timeout
         reward = rules.progress * (before - state["distance"]) + rules.success * success
         reward += rules.slack + rules.collision * self._blocked
-        above = None
-        if rules.block != 0.0 and self.homes.blocks.most > 0:
-            above = self.homes.blocks.find_above(
-                state["home"], state["position"], state["yaw"], self.config.robot.length
-            ).float()
-            reward += rules.block * above
-        reward = torch.where(evicted, 0.0, rules.scale * reward)
+        reward = rules.scale * reward
         self.ended = end_episodes(
-            done & ~evicted,
+            done,
             state["home"],
             success,
             state["collisions"],
@@ -255,7 +236,7 @@ class NavEnvironment:
             state["distance"],
             episodes.success_radius,
         )
-        self._measures.add(self.ended, reward, self._blocked, self._moved, evicted, above)
+        self._measures.add(self.ended, reward, self._blocked, self._moved)
         self._observation = None
         return reward, done, timeout
 
@@ -293,7 +274,6 @@ class NavEnvironment:
         self.restart()
         for name, values in (("home", home), ("goal", goal), ("position", position), ("yaw", yaw)):
             self.state[name].copy_(torch.as_tensor(values))
-        self.state["generation"].copy_(self.homes.generations()[self.state["home"].long()])
         self._launch(measure_robots, self.num_envs, [self.homes.homes, self._robots])
         lost = (~torch.isfinite(self.state["distance"])).nonzero()
         if len(lost):

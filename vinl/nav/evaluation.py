@@ -147,7 +147,7 @@ def evaluate_kind(
         trail = torch.stack(paths, 1).cpu().numpy().astype(np.float64)
         ended = {name: value.cpu().numpy() for name, value in figures._asdict().items()}
     names, left_out = [r.name for r in homes.records], config.num_envs - len(kept)
-    results = KindResults(kind, names, homes.dropped, homes.reasons, left_out, [], [])
+    results = KindResults(kind, names, len(homes.reasons), homes.reasons, left_out, [], [])
     for k in kept:
         home, task, yaw = homes.records[int(begun["home"][k])], tasks[k], float(begun["yaw"][k])
         steps = round(float(ended["steps"][k]))

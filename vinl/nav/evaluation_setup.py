@@ -137,7 +137,6 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
         starts=512,
         layouts={},
         start_clearance=rules.start_clearance,
-        fresh=0.0,
         plans=(),
         plans_share=0.0,
     )

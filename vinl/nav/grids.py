@@ -33,7 +33,6 @@ class Homes:
     fields: wp.array(dtype=wp.float16, ndim=2)
     goals: wp.array(dtype=wp.vec2, ndim=2)
     starts: wp.array(dtype=wp.vec2, ndim=2)
-    generation: wp.array(dtype=wp.int32)
     meshes: wp.array(dtype=wp.uint64)
 
 

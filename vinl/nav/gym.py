@@ -84,10 +84,6 @@ class NavVectorEnv(VectorEnv):
         success = (done & ~timeout).cpu().numpy()
         return _observation(environment), reward.cpu().numpy(), success, timeout.cpu().numpy(), info
 
-    def close_extras(self, **kwargs: Any) -> None:
-        """End the processes that build homes, if there are any."""
-        self.environment.homes.close()
-
 
 class NavEnv(gymnasium.Env):
     """One robot. Observations are a dictionary of ``depth`` (height, width) in [0, 1] and ``vector`` (5,), float32.
@@ -150,10 +146,6 @@ class NavEnv(gymnasium.Env):
             depth[0].float().clamp(min=0.0).cpu().numpy(),
             environment.config.robot,
         )
-
-    def close(self) -> None:
-        """End the processes that build homes, if there are any."""
-        self.environment.homes.close()
 
     def _position(self) -> np.ndarray:
         return self.environment.state["position"][0].cpu().numpy().copy()

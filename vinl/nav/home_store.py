@@ -1,66 +1,96 @@
-"""Thousands of homes on one device: which they are, where they come from, and how fresh ones take their places."""
+"""Thousands of homes on one device: grids for the kernels, meshes for the camera; built by several processes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import multiprocessing
+import os
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import closing
+from itertools import count, repeat
 from typing import Any
 
 import numpy as np
 import torch
+import warp as wp
 
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
-from vinl.nav.home_builder import BuiltHome, HomeRecord, prepare_home
-from vinl.nav.home_memory import HomeMemory
-from vinl.nav.home_stream import HomeStream, build_plans, count_workers
-from vinl.sensing.depth import check_device
+from vinl.nav.grids import Homes
+from vinl.nav.home_builder import BuiltHome, HomeRecord, build_home, build_plan, prepare_home
+from vinl.sensing.depth import build_mesh, check_device
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers import check_file, expand_paths
 
 _TRIES = 50
 """So many homes dropped for each one kept, and the configuration is refused."""
 
-_SPARE_ROOM = 1.3
-"""A fresh home takes the place of one up to this much larger."""
+_FEW = 24
+"""So few homes are built sooner in place than processes start."""
 
 
 class HomeStore:
-    """Homes on a device, each in a slot of its own size; a slot can take another home while robots run.
+    """Homes on a device, one after another.
 
     Args:
         built: at least one home, all with as many goals and starts.
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:1"``.
-        dropped: how many homes were dropped on the way here, because no path led through them.
+        reasons: why others were dropped on the way here.
         tree: how Warp builds the ray trees of the meshes: ``"sah"`` (on the host), ``"lbvh"`` (on a GPU); Warp
             chooses by default.
 
     Attributes:
-        records: of the home in every slot.
+        records: of every home.
         homes: the grids on the device, for the kernels.
-        blocks: the clutter on the device.
         device: torch device.
-        dropped: homes without a path so far; they are never used.
-        reasons: why those were dropped that were there when the store was built.
-        replaced: homes that took another's place so far.
-        skipped: fresh homes that found no slot of their size.
+        reasons: as given.
 
     Raises:
-        InputError: there is no home, or no such device.
+        InputError: there is no home, or no such device; the homes are too large together, or differ in their number of
+            goals or starts.
     """
 
     def __init__(
-        self, built: Sequence[BuiltHome], device: str | torch.device = "cpu", dropped: int = 0, tree: str | None = None
+        self,
+        built: Sequence[BuiltHome],
+        device: str | torch.device = "cpu",
+        reasons: Sequence[str] = (),
+        tree: str | None = None,
     ) -> None:
         if not built:
-            raise InputError("the navigation environment needs at least one home")
-        self._memory = HomeMemory(built, check_device(device), tree)
-        self.device, self.homes, self.blocks = self._memory.device, self._memory.homes, self._memory.blocks
-        self.records = [_record(home) for home in built]
-        self.dropped, self.replaced, self.skipped = dropped, 0, 0
-        self.reasons: list[str] = []
-        self._age = np.arange(len(built))
-        self._stream: HomeStream | None = None
-        self._due, self._pace = 0.0, 0.0
+            raise InputError("no home can be used" + (f"; the last: {reasons[-1]}" if reasons else ""))
+        self.device, self.reasons = check_device(device), list(reasons)
+        self.records = [HomeRecord(h.seed, h.name, h.frame, h.floor, h.solid, h.blocks) for h in built]
+        self._meshes = [self._build_mesh(home, tree) for home in built]
+        count, ends = len(built), np.cumsum([home.cells for home in built])
+        cells, first = int(ends[-1]), np.concatenate([[0], ends[:-1]]).astype(np.int32)
+        if cells * 4 >= 2**31:
+            raise InputError(f"{count} homes have {cells} cells together; a store holds up to {2**29}: use fewer homes")
+        shapes = {(home.goals.shape, home.starts.shape) for home in built}
+        if len(shapes) > 1:
+            raise InputError("all homes of a store need as many goals and starts")
+
+        def put(values: list[Any], kind: type) -> torch.Tensor:
+            return torch.as_tensor(np.array(values, kind), device=self.device)
+
+        self._tensors = {
+            "first": put(list(first), np.int32),
+            "shape": put([home.fields.shape[:2] for home in built], np.int32),
+            "origin": put([home.origin for home in built], np.float32),
+            "clearance": torch.empty(4 * cells, dtype=torch.float16, device=self.device),
+            "fields": torch.empty(cells, len(built[0].goals), dtype=torch.float16, device=self.device),
+            "goals": put([home.goals for home in built], np.float32),
+            "starts": put([home.starts for home in built], np.float32),
+            "meshes": put([mesh.id for mesh in self._meshes], np.int64),
+        }
+        for begin, end, home in zip(first, ends, built, strict=True):
+            self._tensors["fields"][begin:end] = torch.from_numpy(home.fields).flatten(0, 1)
+            self._tensors["clearance"][4 * begin : 4 * end] = torch.from_numpy(home.clearance).flatten()
+        vectors = {"shape": wp.vec2i, "origin": wp.vec2, "goals": wp.vec2, "starts": wp.vec2, "meshes": wp.uint64}
+        self.homes = Homes()
+        for name, tensor in self._tensors.items():
+            setattr(self.homes, name, wp.from_torch(tensor, dtype=vectors.get(name)))
 
     @classmethod
     def build(
@@ -84,14 +114,9 @@ class HomeStore:
         device = check_device(device)  # before minutes of building
         for plan in expand_paths(config.homes.plans):
             check_file(plan)
-        wanted = config.homes.count
-        workers = count_workers(config, wanted)
-        stream = HomeStream(config, config.homes.seed, workers)
-        built: list[BuiltHome] = []
-        reasons: list[str] = []
-        try:
-            while len(built) < wanted:
-                home = stream.next()
+        wanted, built, reasons = config.homes.count, list[BuiltHome](), list[str]()
+        with closing(_stream_homes(config, _count_workers(config, wanted))) as stream:
+            for home in stream:
                 if isinstance(home, str):
                     reasons.append(home)
                     if len(reasons) > _TRIES * (len(built) + 1):
@@ -102,38 +127,23 @@ class HomeStore:
                 built.append(home)
                 if progress is not None:
                     progress(len(built), wanted)
-            store = cls(built, device, len(reasons), tree)
-            store.reasons = reasons
-        except BaseException:
-            stream.close()
-            raise
-        if config.homes.fresh > 0:
-            store._stream, store._pace = stream, config.homes.fresh * wanted / 1000
-        else:
-            stream.close()
-        return store
+                if len(built) == wanted:
+                    break
+        return cls(built, device, reasons, tree)
 
     @classmethod
-    def from_plans(
-        cls, plans: Iterable[FloorPlan], config: NavConfig, device: str | torch.device = "cpu", copies: int = 1
-    ) -> HomeStore:
+    def from_plans(cls, plans: Iterable[FloorPlan], config: NavConfig, device: str | torch.device = "cpu") -> HomeStore:
         """Given floor plans, each with ``config.homes.goals`` goals.
 
         Args:
             plans: on grids of 5 cm.
             config: of the environment; its generator is not used.
             device: for the homes.
-            copies: times that every plan is there, each with other goals.
 
         Raises:
             InputError: none of the plans can be used; the message says why not.
         """
-        homes = (
-            prepare_home(plan, config.homes.seed + k * copies + copy, config)
-            for k, plan in enumerate(plans)
-            for copy in range(copies)
-        )
-        return cls._of(homes, device)
+        return cls._of((prepare_home(plan, config.homes.seed + k, config) for k, plan in enumerate(plans)), device)
 
     @classmethod
     def from_paths(
@@ -141,7 +151,6 @@ class HomeStore:
         paths: Sequence[str],
         config: NavConfig,
         device: str | torch.device = "cpu",
-        copies: int = 1,
         progress: Callable[[int, int], None] | None = None,
     ) -> HomeStore:
         """Floor plans' files and ranges of plans in them, read and built by several processes where there are many.
@@ -152,7 +161,6 @@ class HomeStore:
             paths: see ``vinl.world.readers.expand_paths``.
             config: of the environment; its generator is not used.
             device: for the homes.
-            copies: times that every plan is there, each with other goals.
             progress: called with the plans read so far and how many there are.
 
         Raises:
@@ -162,28 +170,19 @@ class HomeStore:
         for plan in plans:
             check_file(plan)
 
-        def count() -> Iterator[BuiltHome | str]:
-            for done, home in enumerate(build_plans(plans, config, copies), 1):
+        def show() -> Iterator[BuiltHome | str]:
+            for done, home in enumerate(_build_plans(plans, config), 1):
                 if progress is not None:
-                    progress(done, len(plans) * copies)
+                    progress(done, len(plans))
                 yield home
 
-        return cls._of(count(), device)
+        return cls._of(show(), device)
 
     @classmethod
     def _of(cls, homes: Iterable[BuiltHome | str], device: str | torch.device) -> HomeStore:
-        built: list[BuiltHome] = []
-        reasons: list[str] = []
-        for home in homes:
-            if isinstance(home, str):
-                reasons.append(home)
-            else:
-                built.append(home)
-        if not built:
-            raise InputError("no floor plan can be used" + (f"; the last: {reasons[-1]}" if reasons else ""))
-        store = cls(built, device, len(reasons))
-        store.reasons = reasons
-        return store
+        found = list(homes)
+        built = [home for home in found if not isinstance(home, str)]
+        return cls(built, device, [home for home in found if isinstance(home, str)])
 
     def __len__(self) -> int:
         """How many homes there are."""
@@ -192,69 +191,61 @@ class HomeStore:
     @property
     def memory_bytes(self) -> int:
         """Device memory of all homes but their meshes' ray trees."""
-        return self._memory.count_bytes()
-
-    def refresh(self) -> int:
-        """Put fresh homes, as far as they are due and ready, in the place of old ones; call it once a step.
-
-        The host never waits. The slot's generation grows by one, by which the environment knows the robots that were
-        there.
-
-        Returns:
-            How many homes were replaced.
-        """
-        if self._stream is None:
-            return 0
-        self._due = min(self._due + self._pace, float(len(self)))
-        count = 0
-        if self._due >= 1:
-            for home in self._stream.take_ready():
-                if isinstance(home, str):
-                    self.dropped += 1
-                    continue
-                if self.replace(home):
-                    count += 1
-                    self._due -= 1
-                if self._due < 1:
-                    break
-        return count
-
-    def replace(self, home: BuiltHome) -> bool:
-        """Put a home in the place of the oldest one whose slot is as large or a little larger.
-
-        Returns:
-            False if there is no such slot; the home is then counted in ``skipped``.
-        """
-        capacity = self._memory.capacity
-        fitting = (capacity >= home.cells) & (capacity <= _SPARE_ROOM * home.cells)
-        if not fitting.any():
-            self.skipped += 1
-            return False
-        slot = int(np.where(fitting, self._age, np.iinfo(np.int64).max).argmin())
-        self._age[slot] = self._age.max() + 1
-        self.records[slot] = _record(home)
-        self._memory.replace(slot, home)
-        self.replaced += 1
-        return True
-
-    def generations(self) -> torch.Tensor:
-        """(homes,) int32 on the device: how many homes were in each slot before."""
-        return self._memory.generations()
+        grids = sum(tensor.nbytes for tensor in self._tensors.values())
+        return grids + sum(mesh.points.capacity + mesh.indices.capacity for mesh in self._meshes)
 
     def save_state(self) -> dict[str, Any]:
         """Which homes are here, by their seeds."""
         return {"seeds": [record.seed for record in self.records], "names": [record.name for record in self.records]}
 
-    def holds(self, state: dict[str, Any]) -> bool:
-        """Whether the homes are those of a saved state."""
-        return self.save_state() == state
-
-    def close(self) -> None:
-        """End the processes that build fresh homes."""
-        if self._stream is not None:
-            self._stream.close()
-            self._stream = None
+    def _build_mesh(self, home: BuiltHome, tree: str | None) -> wp.Mesh:
+        on_gpu = self.device.type == "cuda"  # in order with torch's work, which reads the mesh
+        with wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(self.device)) if on_gpu else None):
+            return build_mesh(home.vertices, home.faces, str(self.device), tree)
 
 
-def _record(home: BuiltHome) -> HomeRecord:
-    return HomeRecord(home.seed, home.name, home.frame, home.floor, home.solid, home.blocks)
+def _count_workers(config: NavConfig, homes: int) -> int:
+    """Processes that building so many homes is worth; 0: build in place."""
+    wanted = config.homes.workers
+    if wanted is None:
+        wanted = (os.cpu_count() or 1) - 1 if homes > _FEW else 0
+    return min(wanted, homes)
+
+
+def _stream_homes(config: NavConfig, workers: int) -> Generator[BuiltHome | str, None, None]:
+    """The homes of a configuration in the order of their seeds, without end: each home, or why there is none."""
+    if workers == 0:
+        for seed in count(config.homes.seed):
+            yield build_home(seed, config)
+    pool = _open_pool(workers)
+    try:
+        waiting: deque[Future[BuiltHome | str]] = deque()
+        for seed in count(config.homes.seed):
+            waiting.append(pool.submit(build_home, seed, config))
+            if len(waiting) == 4 * workers:
+                yield waiting.popleft().result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _build_plans(plans: Sequence[str], config: NavConfig) -> Iterator[BuiltHome | str]:
+    """The homes of floor plans' files in their order, by several processes where there are many."""
+    seeds, workers = range(config.homes.seed, config.homes.seed + len(plans)), _count_workers(config, len(plans))
+    if workers == 0:
+        yield from map(build_plan, plans, seeds, repeat(config))
+        return
+    with _open_pool(workers) as pool:
+        yield from pool.map(build_plan, plans, seeds, repeat(config), chunksize=4)
+
+
+def _open_pool(workers: int) -> ProcessPoolExecutor:
+    # fresh processes: a fork of one that uses a GPU, or has threads, may hang
+    return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=_start_worker)
+
+
+def _start_worker() -> None:
+    """A worker has no use for the GPU, and leaves an interrupt to the process that started it."""
+    import signal
+
+    os.environ["CUDA_VISIBLE_DEVICES"] = ""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -33,7 +33,7 @@ class EpisodeEnd(NamedTuple):
     """The figures of the episodes that ended in the last step; other rows mean nothing.
 
     Attributes:
-        counted: an episode ended there that counts (not one whose home was replaced).
+        counted: an episode ended there.
         home: slot of the home.
         success: 1 where the goal was reached.
         spl: success weighted by path length [Anderson et al. 2018].
@@ -109,8 +109,7 @@ class Measures:
 
     def __init__(self, device: torch.device) -> None:
         self._ended = torch.zeros(len(_NAMES), dtype=torch.float64, device=device)
-        self._steps = torch.zeros(6, dtype=torch.float64, device=device)
-        self._sees_blocks = False
+        self._steps = torch.zeros(4, dtype=torch.float64, device=device)
 
     def add(
         self,
@@ -118,15 +117,11 @@ class Measures:
         reward: Float[Tensor, " n"],
         blocked: Float[Tensor, " n"],
         moved: Float[Tensor, " n"],
-        evicted: Bool[Tensor, " n"],
-        above: Float[Tensor, " n"] | None,
     ) -> None:
-        """Count a step of all robots; ``above`` is 1 for those above a block, None where nobody looks."""
-        self._sees_blocks |= above is not None
-        above = torch.zeros_like(reward) if above is None else above
+        """Count a step of all robots."""
         rows = torch.stack([end.counted.float(), *(getattr(end, name) for name in _NAMES[1:])])
         self._ended += torch.where(end.counted, rows, 0.0).sum(1, dtype=torch.float64)
-        step = torch.stack([torch.ones_like(reward), reward, blocked, moved, above, evicted.float()])
+        step = torch.stack([torch.ones_like(reward), reward, blocked, moved])
         self._steps += step.sum(1, dtype=torch.float64)
 
     def read(self, unplaced: Tensor) -> dict[str, float]:
@@ -138,17 +133,14 @@ class Measures:
         values = torch.cat([self._ended, self._steps, unplaced.sum(dtype=torch.float64)[None]]).tolist()
         for sums in (self._ended, self._steps, unplaced):
             sums.zero_()
-        ended, steps = dict(zip(_NAMES, values[: len(_NAMES)], strict=True)), max(values[-7], 1.0)
+        ended, steps = dict(zip(_NAMES, values[: len(_NAMES)], strict=True)), max(values[-5], 1.0)
         episodes = ended.pop("episodes")
         measures = {"episodes": episodes}
         if episodes > 0:
             measures |= {name: value / episodes for name, value in ended.items()}
-        if self._sees_blocks:
-            measures["above_blocks"] = values[-3] / steps
         return measures | {
-            "reward": values[-6] / steps,
-            "blocked": values[-5] / steps,
-            "step_length": values[-4] / steps,
-            "evicted": values[-2],
+            "reward": values[-4] / steps,
+            "blocked": values[-3] / steps,
+            "step_length": values[-2] / steps,
             "unplaced": values[-1],
         }

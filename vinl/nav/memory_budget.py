@@ -11,10 +11,9 @@ from torch import Tensor
 from vinl.nav.config import NavConfig
 from vinl.nav.home_builder import build_home
 from vinl.nav.home_store import HomeStore
-from vinl.nav.recurrent_ppo import guess_weights
-from vinl.nav.recurrent_storage import RecurrentStorage
+from vinl.nav.recurrent_ppo import build_storage
 from vinl.nav.warm_start import build_actor
-from vinl.policies.nav_actor import ACTION_SIZE, NavActor
+from vinl.policies.nav_actor import NavActor
 
 _TRIED_ROBOTS, _TRIED_STEPS, _TRIED_HOMES = 4, 2, 12
 
@@ -57,19 +56,7 @@ def predict_memory(config: NavConfig) -> dict[str, float]:
 
 def _count_rollout(config: NavConfig, actor: NavActor) -> int:
     """Bytes of the roll-out's buffers, by their shapes alone."""
-    weights = guess_weights(config.ppo)
-    storage = RecurrentStorage(
-        config.ppo.steps,
-        config.num_envs,
-        actor.image,
-        config.ppo.image_type,
-        actor.observation_size,
-        int(config.network.privileged),
-        ACTION_SIZE,
-        actor.initial_state(config.num_envs, "meta"),
-        "meta",
-        hidden=0 if weights is None else len(weights),
-    )
+    storage = build_storage(config, actor, "meta")
     tensors = [value for value in vars(storage).values() if isinstance(value, Tensor)]
     return sum(tensor.nbytes for tensor in [*tensors, *storage.state])
 

@@ -41,9 +41,6 @@ class Rules:
     yaw_drift: wp.float32
     execution_amplitude: wp.vec2
     give_way: wp.float32
-    give_way_share: wp.float32
-    snag: wp.float32
-    snag_depth: wp.float32
     sees_motion: wp.int32
     tilt: wp.vec2
     tilt_offset: wp.vec2
@@ -125,7 +122,7 @@ def move_robots(
     straight: wp.array(dtype=wp.float32),
 ):
     """One step: constant speed, slip and yaw rate over the period. If the swept rectangle touches, it is cancelled as a
-    whole, or all but its turn (``Robots.gives_way``). A robot with a caught leg can only walk back.
+    whole, or all but its turn (``Rules.give_way``).
 
     Writes pose, velocity and distance of the robots, the way moved [m], 1 where it touched, and the straight distance
     to the goal [m]. Where the goal cannot be reached from the new place, the distance stays as it was.
@@ -157,14 +154,6 @@ def move_robots(
     turning = 0.5 + 0.5 * wp.min(wp.max(pace, wp.abs(w) / rules.max_yaw_rate), 1.0)
     w = w + gain[2] * pace + rules.yaw_noise * wp.randn(state) * gain[3] * turning
 
-    caught = robots.caught[n]
-    if caught > 0.0:
-        v = wp.min(v, 0.0)
-        v_end = wp.min(v_end, 0.0)
-        slip = 0.0
-        w = float(0.0)
-        w_end = float(0.0)
-
     start = robots.position[n]
     yaw = robots.yaw[n]
     hit = sweep_touches(homes, home, rules, start, yaw, v, slip, w, wp.vec2(0.0, 0.0))
@@ -176,7 +165,7 @@ def move_robots(
         p = start
         turned = bool(False)
         moved[n] = 0.0
-        if robots.gives_way[n] != 0 and caught <= 0.0:
+        if rules.give_way > 0.0:
             ahead = wp.vec2(wp.cos(yaw), wp.sin(yaw))
             aside = wp.vec2(-ahead[1], ahead[0])
             k = int(0)
@@ -210,11 +199,6 @@ def move_robots(
     new_pitch = left * wp.randn(state)
     new_height = left * wp.randn(state)
     robots.sway[n] = rules.correlation * robots.sway[n] + wp.vec3(new_roll, new_pitch, new_height)
-    if rules.snag > 0.0:
-        # one that walks back comes free; one that comes ahead is caught by chance
-        chance = wp.randf(state)
-        fresh = caught <= 0.0 and v > 0.0 and chance < rules.snag * pace
-        robots.caught[n] = wp.where(fresh, rules.snag_depth, wp.max(caught + wp.min(v, 0.0) * rules.period, 0.0))
     robots.position[n] = p
     robots.yaw[n] = wp.atan2(wp.sin(heading), wp.cos(heading))
     robots.speed[n] = v_end
@@ -268,7 +252,6 @@ def place_robots(
         found = (ranged and free) or (tries >= 256 and free) or (tries >= 512 and far) or tries >= 1024
         if found:
             robots.home[n] = home
-            robots.generation[n] = homes.generation[home]
             robots.goal[n] = goal
             robots.position[n] = p
             robots.yaw[n] = yaw
@@ -294,7 +277,4 @@ def place_robots(
     ceiling = float(0.0)
     if wp.randf(state) < rules.ceiling_share:
         ceiling = mix(rules.ceiling, wp.randf(state))
-    # the last draw: with a share of 1 all others are what they were before there was one
-    robots.gives_way[n] = wp.where(rules.give_way > 0.0 and wp.randf(state) < rules.give_way_share, 1, 0)
-    robots.caught[n] = 0.0
     robots.mount[n] = wp.vec4(roll, pitch, height, ceiling)

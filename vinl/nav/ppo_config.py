@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from vinl.config.errors import InputError
 
-SCHEDULES = ("adaptive", "linear", "constant")
 VISIONS, MEMORIES = ("resnet18", "cnn"), ("lstm", "mlp")
 IMAGE_TYPES = ("float16", "uint8")
 
@@ -25,8 +24,6 @@ class NetworkConfig:
         memory: ``lstm``, or ``mlp``, which remembers nothing.
         places: the network keeps a map of its own of where it has been and what its camera saw to be solid, and sees
             the 4 m around it (``vinl.policies.own_map``); needs ``previous`` motion or both.
-        values: width of a layer of the critic's own between feature and value; 0: none.
-        privileged: the critic also sees the geodesic distance to the goal, which the robot does not know.
     """
 
     vision: str = "resnet18"
@@ -37,8 +34,6 @@ class NetworkConfig:
     layers: int = 2
     memory: str = "lstm"
     places: bool = False
-    values: int = 0
-    privileged: bool = False
 
     def __post_init__(self) -> None:
         if self.vision not in VISIONS:
@@ -48,8 +43,6 @@ class NetworkConfig:
         for name in ("planes", "visual", "embedding", "hidden", "layers"):
             if getattr(self, name) < 1:
                 raise InputError(f"network.{name} must be at least 1, got {getattr(self, name)}")
-        if self.values < 0:
-            raise InputError(f"network.values must not be negative, got {self.values}")
         if self.planes % 16 and self.vision == "resnet18":
             raise InputError(f"network.planes must be a multiple of 16 (groups of the norms), got {self.planes}")
 
@@ -61,26 +54,20 @@ class PpoConfig:
     Attributes:
         steps: steps of each robot between updates; also how far back errors go through the memory.
         epochs, minibatches: passes over the roll-out and parts (of robots) of each.
-        learning_rate: at the start.
-        schedule: ``adaptive`` follows ``desired_kl`` within ``min_rate`` and ``max_rate``; ``linear`` falls from
-            ``learning_rate`` to ``last_rate``; ``constant`` stays.
-        desired_kl: divergence of an update that the adaptive rate is steered to.
-        adapt_each: steer after every minibatch [rsl-rl]; otherwise once an update.
-        min_rate, max_rate: limits of the adaptive rate; without a floor the divergence of ever surer actions brings
+        learning_rate: at the start; it then follows ``desired_kl`` within ``min_rate`` and ``max_rate``.
+        desired_kl: divergence of an update that the rate is steered to.
+        min_rate, max_rate: limits of the rate; without a floor the divergence of ever surer actions brings
             it, and learning with it, to a halt.
-        cool_from: from this share of the iterations on the limits fall, linearly, towards ``last_rate``; 1: never.
-        last_rate: learning rate at the end, see ``cool_from`` and ``schedule``.
+        cool_from: from this fraction of the iterations on the limits fall, linearly, towards ``last_rate``; 1: never.
+        last_rate: learning rate at the end, see ``cool_from``.
         gamma, lam: discount and GAE factor.
         clip: of the probability ratio and of the value.
         value: weight of the value loss.
         entropy, last_entropy: weight of the entropy bonus at the start and, moving from ``cool_from`` on, at the end;
             null: it stays.
-        way: weight of a further loss: a linear layer on the memory's output is to tell where the shortest way leads
-            (squared error of the unit vector). Only training knows that; it teaches the memory what a home is like,
-            much faster than rewards do. 0: none.
-        places: weight of another such loss: a linear layer is to tell where in the 4 m around it the robot has been
-            lately (``vinl.policies.places``), so that the memory learns to keep places and to know them again. Motion
-            and images hold all that it takes. 0: none.
+        places: weight of a further loss: a linear layer on the memory's output is to tell where in the 4 m around it
+            the robot has been lately (``vinl.policies.places``), so that the memory learns to keep places and to know
+            them again. Motion and images hold all that it takes. 0: none.
         max_grad_norm: gradients are clipped to this norm.
         log_std, log_std_range: logarithm of the actions' standard deviation at the start, and its limits.
         last_log_std: from ``cool_from`` on the upper limit moves to this: what is shipped acts without chance, and
@@ -90,7 +77,6 @@ class PpoConfig:
         image_type: how the roll-out keeps images: ``float16``, or ``uint8`` in half the memory.
         bf16: images in bfloat16 (GPU only).
         compiled: image network through ``torch.compile`` (GPU only): a minute at the start, then faster.
-        graphs: minibatches as a CUDA graph (one GPU only).
         keep_at: the policy is also kept aside once after so many samples.
     """
 
@@ -98,9 +84,7 @@ class PpoConfig:
     epochs: int = 2
     minibatches: int = 4
     learning_rate: float = 5e-4
-    schedule: str = "adaptive"
     desired_kl: float = 0.01
-    adapt_each: bool = False
     min_rate: float = 2e-4
     max_rate: float = 1.5e-3
     cool_from: float = 0.7
@@ -111,7 +95,6 @@ class PpoConfig:
     value: float = 0.5
     entropy: float = 0.003
     last_entropy: float | None = None
-    way: float = 0.0
     places: float = 0.0
     max_grad_norm: float = 0.5
     log_std: float = -0.5
@@ -121,7 +104,6 @@ class PpoConfig:
     image_type: str = "float16"
     bf16: bool = True
     compiled: bool = True
-    graphs: bool = False
     keep_at: tuple[float, ...] = (2.5e6, 1e7, 2e7, 5e7, 1e8, 2e8, 5e8)
 
     def __post_init__(self) -> None:
@@ -129,8 +111,6 @@ class PpoConfig:
             raise InputError("ppo: steps, epochs and minibatches must be at least 1")
         if self.critic_warmup < 0:
             raise InputError(f"ppo.critic_warmup must not be negative, got {self.critic_warmup}")
-        if self.schedule not in SCHEDULES:
-            raise InputError(f"ppo.schedule must be one of {', '.join(SCHEDULES)}, got {self.schedule!r}")
         if self.image_type not in IMAGE_TYPES:
             raise InputError(f"ppo.image_type must be one of {', '.join(IMAGE_TYPES)}, got {self.image_type!r}")
         if not 0 < self.min_rate <= self.learning_rate <= self.max_rate:
@@ -138,7 +118,7 @@ class PpoConfig:
         for name in ("desired_kl", "last_rate", "clip", "max_grad_norm"):
             if not getattr(self, name) > 0:
                 raise InputError(f"ppo.{name} must be positive, got {getattr(self, name)}")
-        for name in ("value", "entropy", "last_entropy", "way", "places"):
+        for name in ("value", "entropy", "last_entropy", "places"):
             if (getattr(self, name) or 0.0) < 0:
                 raise InputError(f"ppo.{name} must not be negative, got {getattr(self, name)}")
         if not 0 < self.gamma <= 1 or not 0 <= self.lam <= 1 or not 0 <= self.cool_from <= 1:
@@ -149,27 +129,22 @@ class PpoConfig:
         if self.last_log_std is not None and not low <= self.last_log_std <= high:
             raise InputError(f"ppo.last_log_std must lie within log_std_range, got {self.last_log_std:g}")
 
-    def rate_limits(self, share: float) -> tuple[float, float]:
-        """Lowest and highest learning rate after a share of the iterations."""
-        if self.schedule == "linear":
-            rate = self.learning_rate + share * (self.last_rate - self.learning_rate)
-            return rate, rate
-        adaptive = self.schedule == "adaptive"
-        low, high = (self.min_rate, self.max_rate) if adaptive else (self.learning_rate, self.learning_rate)
-        cooled = self._cooled(share)
+    def rate_limits(self, fraction: float) -> tuple[float, float]:
+        """Lowest and highest learning rate after a fraction of the iterations."""
+        cooled, low = self._cooled(fraction), self.min_rate
         low += cooled * (min(self.last_rate, low) - low)
-        return low, max(low, high + cooled * (self.last_rate - high))
+        return low, max(low, self.max_rate + cooled * (self.last_rate - self.max_rate))
 
-    def entropy_at(self, share: float) -> float:
-        """Weight of the entropy bonus after a share of the iterations."""
+    def entropy_at(self, fraction: float) -> float:
+        """Weight of the entropy bonus after a fraction of the iterations."""
         last = self.entropy if self.last_entropy is None else self.last_entropy
-        return self.entropy + self._cooled(share) * (last - self.entropy)
+        return self.entropy + self._cooled(fraction) * (last - self.entropy)
 
-    def spread_at(self, share: float) -> tuple[float, float]:
-        """Limits of the logarithm of the actions' standard deviation after a share of the iterations."""
+    def spread_at(self, fraction: float) -> tuple[float, float]:
+        """Limits of the logarithm of the actions' standard deviation after a fraction of the iterations."""
         low, high = self.log_std_range
         last = high if self.last_log_std is None else self.last_log_std
-        return low, high + self._cooled(share) * (last - high)
+        return low, high + self._cooled(fraction) * (last - high)
 
-    def _cooled(self, share: float) -> float:
-        return min(max((share - self.cool_from) / (1.0 - self.cool_from), 0.0), 1.0) if self.cool_from < 1 else 0.0
+    def _cooled(self, fraction: float) -> float:
+        return min(max((fraction - self.cool_from) / (1.0 - self.cool_from), 0.0), 1.0) if self.cool_from < 1 else 0.0

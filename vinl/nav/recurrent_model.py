@@ -62,8 +62,6 @@ class RecurrentActorCritic(nn.Module):
         actor: a ``MemoryActor``.
         log_std: logarithm of the actions' standard deviation at the start.
         log_std_range: it is held within these.
-        privileged: numbers that only the critic sees.
-        values: width of a layer between feature and value; 0: none.
         guesses: hidden numbers that the feature is to tell.
     """
 
@@ -74,24 +72,18 @@ class RecurrentActorCritic(nn.Module):
         actor: PolicyNetwork,
         log_std: float = -0.5,
         log_std_range: tuple[float, float] = (-2.0, 0.2),
-        privileged: int = 0,
-        values: int = 0,
         guesses: int = 0,
     ) -> None:
         super().__init__()
         self.actor = actor
-        self.privileged = privileged
         self.log_std = nn.Parameter(torch.full((actor.action_size,), float(log_std)))
-        # on the device, so that a recorded graph sees it move
         self.register_buffer("_log_std_range", torch.tensor(log_std_range, dtype=torch.float32), persistent=False)
-        width = cast(MemoryActor, actor).feature_size + privileged
-        self.value = nn.Sequential(*([nn.Linear(width, values), nn.ELU()] if values else []))
-        self.value.append(nn.Linear(values or width, 1))
-        self.guess = nn.Linear(cast(MemoryActor, actor).feature_size, guesses) if guesses else None
-        for layer in self.value:
-            if isinstance(layer, nn.Linear):
-                nn.init.orthogonal_(layer.weight)
-                nn.init.zeros_(layer.bias)
+        width = cast(MemoryActor, actor).feature_size
+        value = nn.Linear(width, 1)
+        self.value = nn.Sequential(value)
+        self.guess = nn.Linear(width, guesses) if guesses else None
+        nn.init.orthogonal_(value.weight)
+        nn.init.zeros_(value.bias)
 
     def forward(
         self,
@@ -99,16 +91,14 @@ class RecurrentActorCritic(nn.Module):
         vector: Float[Tensor, "t n k"],
         state: State,
         fresh: Bool[Tensor, "t n"],
-        privileged: Float[Tensor, "t n p"] | None = None,
     ) -> Outlook:
         """What is made of t steps; images in [0, 1] or as bytes."""
         actor = cast(MemoryActor, self.actor)
         feature, state = actor.look(as_unit(depth), vector, state, fresh)
         feature = feature.float()
         with torch.autocast(feature.device.type, enabled=False):
-            seen = feature if privileged is None else torch.cat([feature, privileged.float()], -1)
             guess = feature[..., :0] if self.guess is None else self.guess(feature)
-            return Outlook(actor.choose(feature), self.value(seen)[..., 0], state, guess)
+            return Outlook(actor.choose(feature), self.value(feature)[..., 0], state, guess)
 
     def actor_parameters(self) -> list[nn.Parameter]:
         """Those of the actor, the part shared with the critic included, and of its spread."""

@@ -16,13 +16,14 @@ from tensordict import TensorDict
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
+from vinl.nav.config import NavConfig
 from vinl.nav.ppo_config import PpoConfig
 from vinl.nav.recurrent_model import RecurrentActorCritic
 from vinl.nav.recurrent_storage import RecurrentStorage
+from vinl.policies.nav_actor import NavActor
 from vinl.policies.places import VIEW
 from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers
-from vinl.rl.step_graph import StepGraph
 
 _LOG_2PI = math.log(2.0 * math.pi)
 _SUMS = ("surrogate", "value", "entropy", "guess", "kl", "clipped", "gradient_norm")
@@ -33,7 +34,7 @@ class RecurrentPPO:
     """Learns from roll-outs of a ``RecurrentActorCritic``.
 
     Observations are a ``TensorDict`` with ``vector`` (n, k), ``depth`` (n, H, W) in [0, 1] unless the actor is blind,
-    ``privileged`` (n, p) if the critic takes it, and ``hidden`` (n, g) if the feature is to tell it.
+    and ``hidden`` (n, g) if the feature is to tell it.
 
     Args:
         model: actor and critic, on the device.
@@ -71,15 +72,11 @@ class RecurrentPPO:
         rate.bind(self.optimizer)
         if config.compiled and on_gpu:
             _compile_vision(model)
-        self._graph = StepGraph(self._learn) if config.graphs and on_gpu and self.peers.count == 1 else None
         self._state = tuple(part.clone() for part in storage.state)
         self._fresh = torch.ones(storage.robots, dtype=torch.bool, device=self.device)
         self._sums = torch.zeros(len(_SUMS), device=self.device)
         self._kl = torch.zeros((), device=self.device)
-        self._guess_weights = guess_weights(config, self.device)
-        # on the device, so that a recorded graph sees it move
-        self._entropy = torch.zeros((), device=self.device)
-        self._actor_share = torch.ones((), device=self.device)
+        self._actor_learns = True
         self._step = 0
 
     @property
@@ -94,17 +91,17 @@ class RecurrentPPO:
 
     def let_actor_learn(self, learns: bool) -> None:
         """Whether the actor and its spread learn from the next minibatch on, or the critic's own weights alone."""
-        self._actor_share.fill_(float(learns))
+        self._actor_learns = learns
 
     def act(self, observation: TensorDict) -> Tensor:
         """Sampled actions (n, a); the observation is stored."""
         st, t = self.storage, self._step
         if t == 0:
             st.begin(self._state, self.model.log_std)
-        depth, privileged = self._keep(observation, t)
+        depth = self._keep(observation, t)
         st.fresh[t] = self._fresh
         with torch.no_grad(), self._precision():
-            seen = self.model(depth, st.vector[t][None], self._state, self._fresh[None], privileged)
+            seen = self.model(depth, st.vector[t][None], self._state, self._fresh[None])
         self._remember(seen.state)
         mean, noise = seen.mean[0], torch.randn_like(seen.mean[0])
         st.means[t], st.values[t] = mean, seen.value[0]
@@ -128,9 +125,8 @@ class RecurrentPPO:
         """Advantages of the roll-out, normalised; ``observation`` is the one after its last step."""
         st, s = self.storage, self.config
         depth = st.as_stored(observation["depth"])[None] if st.depth is not None else None
-        privileged = observation["privileged"][None] if st.privileged is not None else None
         with torch.no_grad(), self._precision():
-            seen = self.model(depth, observation["vector"][None], self._state, self._fresh[None], privileged)
+            seen = self.model(depth, observation["vector"][None], self._state, self._fresh[None])
         st.estimate_advantages(seen.value[0], s.gamma, s.lam)
         mean = st.advantages.mean()
         self.peers.average(mean)
@@ -146,18 +142,13 @@ class RecurrentPPO:
         """
         s, n = self.config, self.storage.robots
         self._sums.zero_()
-        self._entropy.fill_(self.entropy)
         for _ in range(s.epochs):
             self._kl.zero_()
             for robots in torch.randperm(n, device=self.device).chunk(s.minibatches):
-                if self._graph is None:
-                    self._learn(robots)
-                else:
-                    self._graph.run(robots)
-        if not s.adapt_each:
-            kl = self._kl / s.minibatches
-            self.peers.average(kl)
-            self.rate.steer(kl)
+                self._learn(robots)
+        kl = self._kl / s.minibatches
+        self.peers.average(kl)
+        self.rate.steer(kl)
         self._step = 0
         means = (self._sums / (s.epochs * s.minibatches)).tolist()
         if not all(math.isfinite(x) for x in means):
@@ -199,20 +190,16 @@ class RecurrentPPO:
             self._fresh.copy_(saved["fresh"])
         return True
 
-    def _keep(self, observation: TensorDict, t: int) -> tuple[Tensor | None, Tensor | None]:
-        """Store the observation of step t; returns image and privileged numbers as (1, n, ...)."""
+    def _keep(self, observation: TensorDict, t: int) -> Tensor | None:
+        """Store the observation of step t; returns its images (1, n, height, width)."""
         st = self.storage
         st.vector[t] = observation["vector"]
-        depth = privileged = None
-        if st.depth is not None:
-            st.depth[t] = st.as_stored(observation["depth"])
-            depth = st.depth[t][None]
-        if st.privileged is not None:
-            st.privileged[t] = observation["privileged"]
-            privileged = st.privileged[t][None]
         if st.hidden is not None:
             st.hidden[t] = observation["hidden"]
-        return depth, privileged
+        if st.depth is None:
+            return None
+        st.depth[t] = st.as_stored(observation["depth"])
+        return st.depth[t][None]
 
     def _remember(self, state: tuple[Tensor, ...]) -> None:
         for part, now in zip(self._state, state, strict=True):
@@ -226,7 +213,7 @@ class RecurrentPPO:
         s, st, model = self.config, self.storage, self.model
         batch = st.take(robots)
         with self._precision():
-            mean, value, _, guess = model(batch.depth, batch.vector, batch.state, batch.fresh, batch.privileged)
+            mean, value, _, guess = model(batch.depth, batch.vector, batch.state, batch.fresh)
         log_std = model.log_std
         log_ratio = _log_prob(batch.actions, mean, log_std) - batch.log_prob
         ratio = log_ratio.exp()
@@ -236,14 +223,15 @@ class RecurrentPPO:
         value_loss = torch.max((value - batch.returns).square(), (near - batch.returns).square()).mean()
         entropy = (log_std + 0.5 * (1.0 + _LOG_2PI)).sum()
         guess_loss = torch.zeros_like(entropy)
-        if batch.hidden is not None and self._guess_weights is not None:
-            guess_loss = ((guess - batch.hidden).square() * self._guess_weights).sum(-1).mean()
-        loss = surrogate + s.value * value_loss - self._entropy * entropy + guess_loss
+        if batch.hidden is not None:
+            guess_loss = ((guess - batch.hidden).square() * (s.places / guess.shape[-1])).sum(-1).mean()
+        loss = surrogate + s.value * value_loss - self.entropy * entropy + guess_loss
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
-        for weight in model.actor_parameters():
-            if weight.grad is not None:  # Adam leaves a weight alone whose gradient has always been zero
-                weight.grad.mul_(self._actor_share)
+        if not self._actor_learns:  # Adam leaves a weight alone whose gradient has always been zero
+            for weight in model.actor_parameters():
+                if weight.grad is not None:
+                    weight.grad.zero_()
         self.peers.average_gradients(model.parameters())
         norm = nn.utils.clip_grad_norm_(model.parameters(), s.max_grad_norm)
         self.optimizer.step()
@@ -253,21 +241,26 @@ class RecurrentPPO:
             clipped = (bounded != ratio).float().mean()
             self._kl += kl
             self._sums += torch.stack([surrogate, value_loss, entropy, guess_loss, kl, clipped, norm])
-            if s.adapt_each:
-                self.peers.average(kl)
-                self.rate.steer(kl)
 
 
-WAY_SIZE = 2
-"""Numbers that tell where the shortest way leads."""
+def count_guesses(config: PpoConfig) -> int:
+    """Hidden numbers that the feature is to tell: where the robot has been, if that has a weight."""
+    return VIEW**2 if config.places > 0 else 0
 
 
-def guess_weights(config: PpoConfig, device: torch.device | str = "cpu") -> Tensor | None:
-    """Weight of the squared error of each hidden number that the feature is to tell: where the way leads, then where
-    the robot has been, each weight shared out among its numbers; None: there is nothing to tell."""
-    told = ((config.way, WAY_SIZE), (config.places, VIEW**2))
-    parts = [torch.full((size,), weight / size) for weight, size in told if weight]
-    return torch.cat(parts).to(device) if parts else None
+def build_storage(config: NavConfig, actor: NavActor, device: torch.device | str) -> RecurrentStorage:
+    """The roll-out's buffers of a training."""
+    return RecurrentStorage(
+        config.ppo.steps,
+        config.num_envs,
+        actor.image,
+        config.ppo.image_type,
+        actor.observation_size,
+        actor.action_size,
+        actor.initial_state(config.num_envs, device),
+        device,
+        hidden=count_guesses(config.ppo),
+    )
 
 
 def _compile_vision(model: RecurrentActorCritic) -> None:

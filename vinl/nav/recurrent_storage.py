@@ -21,7 +21,6 @@ class Minibatch(NamedTuple):
     vector: Tensor
     state: State
     fresh: Tensor
-    privileged: Tensor | None
     actions: Tensor
     log_prob: Tensor
     means: Tensor
@@ -38,7 +37,7 @@ class RecurrentStorage:
         steps, robots: t and n.
         image: (height, width) of the images, or None.
         image_type: a key of ``IMAGE_TYPES``.
-        vector, privileged, actions, hidden: sizes; ``privileged``, ``hidden`` 0: there is none.
+        vector, actions, hidden: sizes; ``hidden`` 0: there is none.
         state: of the robots at the start; its shapes are taken.
         device: where the buffers lie.
     """
@@ -50,7 +49,6 @@ class RecurrentStorage:
         image: tuple[int, int] | None,
         image_type: str,
         vector: int,
-        privileged: int,
         actions: int,
         state: State,
         device: torch.device | str,
@@ -62,7 +60,6 @@ class RecurrentStorage:
         self.steps, self.robots = steps, robots
         self.depth = room(*image, dtype=IMAGE_TYPES[image_type]) if image else None
         self.vector, self.actions, self.means = room(vector), room(actions), room(actions)
-        self.privileged = room(privileged) if privileged else None
         self.hidden = room(hidden) if hidden else None
         self.fresh, self.done = room(dtype=torch.bool), room(dtype=torch.bool)
         self.log_prob, self.values, self.rewards = room(), room(), room()
@@ -106,7 +103,6 @@ class RecurrentStorage:
             vector=pick(self.vector),
             state=tuple(pick(part) for part in self.state),
             fresh=pick(self.fresh),
-            privileged=None if self.privileged is None else pick(self.privileged),
             actions=pick(self.actions),
             log_prob=pick(self.log_prob),
             means=pick(self.means),

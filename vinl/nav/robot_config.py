@@ -157,10 +157,6 @@ class ExecutionConfig:
         amplitude: range of a factor of an episode on the noises and the slip, uniform; 0 is sure of foot.
         give_way: a step that would touch something is not cancelled as a whole: the robot turns on the spot as told,
             and what its corners meet pushes it so far back or aside at most [m]; 0: cancelled as a whole [paper].
-        give_way_share: share of the episodes in which robots do so; in the others a step is cancelled as a whole.
-        snag: chance of a step at full speed, less in proportion when slower, that a leg is caught at its end: the robot
-            then neither comes ahead nor turns until it has walked back. Nothing that it sees tells why.
-        snag_depth: so far it must walk back [m].
     """
 
     lag: float = 0.0
@@ -172,9 +168,6 @@ class ExecutionConfig:
     yaw_drift: float = 0.0
     amplitude: Range = (1.0, 1.0)
     give_way: float = 0.0
-    give_way_share: float = 1.0
-    snag: float = 0.0
-    snag_depth: float = 0.15
 
     def __post_init__(self) -> None:
         check_number("execution.lag", self.lag, 0.0, 5.0)
@@ -184,6 +177,3 @@ class ExecutionConfig:
             check_number(f"execution.{name}", getattr(self, name), 0.0, 1.0)
         check_range("execution.amplitude", self.amplitude, 0.0, 10.0)
         check_number("execution.give_way", self.give_way, 0.0, 0.5)
-        check_number("execution.give_way_share", self.give_way_share, 0.0, 1.0)
-        check_number("execution.snag", self.snag, 0.0, 1.0)
-        check_number("execution.snag_depth", self.snag_depth, 0.01, 2.0)

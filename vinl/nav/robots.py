@@ -19,7 +19,6 @@ class Robots:
     """The state of all robots."""
 
     home: wp.array(dtype=wp.int32)
-    generation: wp.array(dtype=wp.int32)
     goal: wp.array(dtype=wp.int32)
     position: wp.array(dtype=wp.vec2)
     yaw: wp.array(dtype=wp.float32)
@@ -32,13 +31,10 @@ class Robots:
     amplitude: wp.array(dtype=wp.float32)  # of this episode's sway
     sway: wp.array(dtype=wp.vec3)  # roll, pitch and height within the episode, each of variance 1
     previous: wp.array(dtype=wp.vec2)  # what the robot knows of its last step
-    gives_way: wp.array(dtype=wp.int32)  # 1: in this episode what its corners meet pushes it aside
-    caught: wp.array(dtype=wp.float32)  # a leg is caught until it has walked back so far [m]
 
 
 _STATE = {
     "home": (torch.int32, (), None),
-    "generation": (torch.int32, (), None),
     "goal": (torch.int32, (), None),
     "position": (torch.float32, (2,), wp.vec2),
     "yaw": (torch.float32, (), None),
@@ -51,8 +47,6 @@ _STATE = {
     "amplitude": (torch.float32, (), None),
     "sway": (torch.float32, (3,), wp.vec3),
     "previous": (torch.float32, (2,), wp.vec2),
-    "gives_way": (torch.int32, (), None),
-    "caught": (torch.float32, (), None),
 }
 """Type and shape of each entry of ``Robots`` for one robot, and what a row of it is to Warp."""
 

@@ -31,8 +31,7 @@ def write_rules(config: NavConfig) -> Any:
     rules.speed_noise, rules.yaw_noise = execution.speed_noise, execution.yaw_noise
     rules.side_slip, rules.yaw_drift = execution.side_slip, execution.yaw_drift
     rules.execution_amplitude = wp.vec2(*execution.amplitude)
-    rules.give_way, rules.give_way_share = execution.give_way, execution.give_way_share
-    rules.snag, rules.snag_depth = execution.snag, execution.snag_depth
+    rules.give_way = execution.give_way
     rules.sees_motion = int(config.previous != "action")
     rules.tilt, rules.tilt_offset, rules.tilt_shake = (
         wp.vec2(*motion.tilt),

@@ -17,15 +17,14 @@ from vinl.nav.config import NavConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.home_store import HomeStore
 from vinl.nav.recurrent_model import RecurrentActorCritic
-from vinl.nav.recurrent_ppo import RecurrentPPO, guess_weights
-from vinl.nav.recurrent_storage import RecurrentStorage
+from vinl.nav.recurrent_ppo import RecurrentPPO, build_storage, count_guesses
 from vinl.nav.training_env import NavTrainingEnv
 from vinl.nav.warm_start import build_actor, load_critic, load_start, save_critic
 from vinl.policies.card import PolicyCard, navigation_card
 from vinl.policies.commit import find_commit
 from vinl.policies.io import save_policy
 from vinl.policies.lineage import trace_lineage
-from vinl.policies.nav_actor import ACTION_SIZE, NavActor
+from vinl.policies.nav_actor import NavActor
 from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers, join_peers
 from vinl.rl.peer_loop import PeerLoop, peer_folder
@@ -133,7 +132,7 @@ def train_navigator(
 
     loop = PeerLoop(
         peers,
-        NavTrainingEnv(environment, config.network.privileged, config.ppo.way > 0, config.ppo.places > 0, peers),
+        NavTrainingEnv(environment, config.ppo.places > 0, peers),
         algorithm,
         config.ppo.steps,
         peer_folder(run, peers),
@@ -154,7 +153,6 @@ def train_navigator(
             "lower the first or raise the second (vinl bench memory predicts what they take)"
         ) from None
     finally:
-        environment.homes.close()
         peers.close()
 
 
@@ -237,39 +235,9 @@ def build_algorithm(
     actor = build_actor(config)
     if weights is not None:
         actor.load_state_dict(weights)
-    weights_of_guesses = guess_weights(p)
-    hidden = 0 if weights_of_guesses is None else len(weights_of_guesses)
-    model = RecurrentActorCritic(
-        actor,
-        p.log_std,
-        p.log_std_range,
-        privileged=int(config.network.privileged),
-        values=config.network.values,
-        guesses=hidden,
-    ).to(device)
-    storage = RecurrentStorage(
-        p.steps,
-        config.num_envs,
-        actor.image,
-        p.image_type,
-        actor.observation_size,
-        int(config.network.privileged),
-        ACTION_SIZE,
-        actor.initial_state(config.num_envs, device),
-        device,
-        hidden=hidden,
-    )
-    low, high = p.rate_limits(0.0)
-    rate = DeviceRate(
-        p.learning_rate,
-        low,
-        high,
-        p.desired_kl if p.schedule == "adaptive" else None,
-        _RATE_DOWN,
-        _RATE_DOWN if p.adapt_each else _RATE_UP,
-        device,
-    )
-    return RecurrentPPO(model, storage, rate, p, peers)
+    model = RecurrentActorCritic(actor, p.log_std, p.log_std_range, guesses=count_guesses(p)).to(device)
+    rate = DeviceRate(p.learning_rate, *p.rate_limits(0.0), p.desired_kl, _RATE_DOWN, _RATE_UP, device)
+    return RecurrentPPO(model, build_storage(config, actor, device), rate, p, peers)
 
 
 def make_card(

@@ -7,7 +7,7 @@ from typing import Any
 import torch
 from tensordict import TensorDict
 
-from vinl.nav.environment import DISTANCE_UNIT, NavEnvironment
+from vinl.nav.environment import NavEnvironment
 from vinl.rl.parallel import Peers
 
 
@@ -16,23 +16,17 @@ class NavTrainingEnv:
 
     Args:
         environment: the robots of this process.
-        privileged: whether observations hold the geodesic distance, for the critic.
-        ways, places: whether they hold where the shortest way leads, and where the robot has been lately, for the
-            network to guess.
+        places: whether observations hold where the robot has been lately, for the network to guess.
         peers: the processes of the training.
     """
 
     def __init__(
         self,
         environment: NavEnvironment,
-        privileged: bool = False,
-        ways: bool = False,
         places: bool = False,
         peers: Peers | None = None,
     ) -> None:
-        self.environment, self._privileged = environment, privileged
-        told = ((environment.find_ways, ways), (environment.find_places, places))
-        self._hidden = [find for find, wanted in told if wanted]
+        self.environment, self._places = environment, places
         self.num_envs = environment.num_envs * (peers.count if peers else 1)
 
     def get_observations(self) -> TensorDict:
@@ -62,8 +56,6 @@ class NavTrainingEnv:
         seen = {"vector": vector}
         if self.environment.camera is not None:
             seen["depth"] = depth
-        if self._privileged:
-            seen["privileged"] = self.environment.state["distance"][:, None] / DISTANCE_UNIT
-        if self._hidden:
-            seen["hidden"] = torch.cat([find() for find in self._hidden], 1)
+        if self._places:
+            seen["hidden"] = self.environment.find_places()
         return TensorDict(seen, batch_size=[len(vector)])

@@ -18,8 +18,8 @@ Mesh = tuple[np.ndarray, np.ndarray]
 """Vertices (v, 3) [m] and faces (f, 3)."""
 
 
-def build_mesh(vertices: np.ndarray, faces: np.ndarray, device: str) -> wp.Mesh:
-    """A mesh with its ray tree on the device.
+def build_mesh(vertices: np.ndarray, faces: np.ndarray, device: str, tree: str | None = None) -> wp.Mesh:
+    """A mesh with its ray tree on the device, built in Warp's way of that name, by default of its own choice.
 
     Raises:
         InputError: if there is no face, a face names a vertex that is not there, or a vertex is not finite.
@@ -30,7 +30,8 @@ def build_mesh(vertices: np.ndarray, faces: np.ndarray, device: str) -> wp.Mesh:
     if not np.isfinite(vertices).all() or faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError("a mesh has a vertex that is not finite or a face that names no vertex")
     points = wp.array(np.ascontiguousarray(vertices), dtype=wp.vec3, device=device)
-    return wp.Mesh(points=points, indices=wp.array(faces.ravel(), dtype=wp.int32, device=device))
+    indices = wp.array(faces.ravel(), dtype=wp.int32, device=device)
+    return wp.Mesh(points=points, indices=indices, bvh_constructor=tree)
 
 
 def check_device(device: str | torch.device) -> torch.device:
