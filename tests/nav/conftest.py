@@ -4,7 +4,7 @@ import pytest
 
 from vinl.nav.config import HomesConfig, NavConfig
 from vinl.nav.home_store import HomeStore
-from vinl.nav.robot_config import CameraConfig
+from vinl.nav.robot_config import NavCameraConfig
 from vinl.world.readers import load_floorplan
 
 
@@ -13,7 +13,7 @@ def config() -> NavConfig:
     return NavConfig(
         num_envs=32,
         homes=HomesConfig(count=3, workers=0, goals=4, starts=128),
-        camera=CameraConfig(width=16, height=12),
+        camera=NavCameraConfig(width=16, height=12),
     )
 
 

@@ -8,13 +8,13 @@ import torch
 from vinl.config.errors import InputError
 from vinl.nav.config import EpisodeConfig
 from vinl.nav.environment import NavEnvironment
-from vinl.nav.ppo_config import PpoConfig
+from vinl.nav.ppo_config import NavPpoConfig
 from vinl.policies.places import VIEW
 from vinl.policies.velocity_range import VelocityRange
 
 
 def test_places_are_those_of_the_episode(config, homes):
-    settings = replace(config, num_envs=40, camera=None, ppo=PpoConfig(places=0.1), episodes=EpisodeConfig(steps=12))
+    settings = replace(config, num_envs=40, camera=None, ppo=NavPpoConfig(places=0.1), episodes=EpisodeConfig(steps=12))
     environment = NavEnvironment(settings, homes)
     begun = environment.find_places().sum(1)
     assert (begun >= 1).all() and (begun <= 4).all()  # here and nowhere else; an askew view may read a cell twice
@@ -24,7 +24,7 @@ def test_places_are_those_of_the_episode(config, homes):
         assert (seen[:, VIEW // 2, VIEW // 2] == 1).all() and (seen[ended].sum((1, 2)) <= 4).all()
     assert seen.sum() > 60
     with pytest.raises(InputError, match=r"ppo\.places"):
-        NavEnvironment(replace(settings, ppo=PpoConfig()), homes).find_places()
+        NavEnvironment(replace(settings, ppo=NavPpoConfig()), homes).find_places()
 
 
 def test_steps_are_well_formed(config, homes):

@@ -15,7 +15,7 @@ from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.nav.config import NavConfig
-from vinl.nav.ppo_config import PpoConfig
+from vinl.nav.ppo_config import NavPpoConfig
 from vinl.nav.recurrent_ppo import count_guesses
 from vinl.nav.training import build_algorithm, make_card, separate
 from vinl.nav.warm_start import build_actor, load_critic, load_start, save_critic
@@ -205,11 +205,13 @@ def test_another_network_than_the_policys_is_refused(tmp_path):
 
 
 def test_the_learning_rate_and_the_entropy_cool_down():
-    ppo = PpoConfig(learning_rate=5e-4, min_rate=2e-4, max_rate=1e-3, cool_from=0.5, last_rate=1e-5, last_entropy=0.0)
+    ppo = NavPpoConfig(
+        learning_rate=5e-4, min_rate=2e-4, max_rate=1e-3, cool_from=0.5, last_rate=1e-5, last_entropy=0.0
+    )
     assert ppo.rate_limits(0.0) == ppo.rate_limits(0.5) == (2e-4, 1e-3)
     assert ppo.rate_limits(1.0) == pytest.approx((1e-5, 1e-5))
     assert ppo.rate_limits(0.75) == pytest.approx((1.05e-4, 5.05e-4))
-    assert PpoConfig(cool_from=0.5, last_log_std=-1.8).spread_at(0.75) == pytest.approx((-2.0, -0.8))
+    assert NavPpoConfig(cool_from=0.5, last_log_std=-1.8).spread_at(0.75) == pytest.approx((-2.0, -0.8))
     assert ppo.spread_at(1.0) == ppo.log_std_range
     assert ppo.entropy_at(0.5) == 0.003 and ppo.entropy_at(1.0) == 0.0
 
@@ -225,7 +227,7 @@ def test_the_memory_may_be_taught_places(tmp_path, small):
     assert train(small, tmp_path / "run", "--iterations", "2", "ppo.places=0.3") == 0
     assert all(row["loss/guess"] > 0 for row in rows(tmp_path / "run"))
     assert not any("guess" in name for name in load_policy(tmp_path / "run").network.state_dict())
-    assert (count_guesses(PpoConfig(places=0.3)), count_guesses(PpoConfig())) == (81, 0)
+    assert (count_guesses(NavPpoConfig(places=0.3)), count_guesses(NavPpoConfig())) == (81, 0)
 
 
 def test_a_network_with_a_map_of_its_own_can_be_trained_and_judged(tmp_path, small):

@@ -11,7 +11,7 @@ from tensordict import TensorDict
 from torch import nn
 
 from vinl.config.errors import InputError
-from vinl.nav.ppo_config import PpoConfig
+from vinl.nav.ppo_config import NavPpoConfig
 from vinl.nav.recurrent_model import RecurrentActorCritic
 from vinl.nav.recurrent_ppo import RecurrentPPO
 from vinl.nav.recurrent_storage import RecurrentStorage
@@ -77,7 +77,7 @@ def build(n=64, image=False, image_type="float16", rate=3e-3, peers=None, hidden
     model = RecurrentActorCritic(ToyActor(image), guesses=hidden)
     state = model.actor.initial_state(n)
     storage = RecurrentStorage(STEPS, n, model.actor.image, image_type, 1, 1, state, "cpu", hidden)
-    return RecurrentPPO(model, storage, DeviceRate(rate), PpoConfig(**settings), peers)
+    return RecurrentPPO(model, storage, DeviceRate(rate), NavPpoConfig(**settings), peers)
 
 
 def roll_out(algorithm, task, observation):

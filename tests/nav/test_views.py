@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import torch
 
-from vinl.nav.config import EpisodeConfig, RewardConfig
+from vinl.nav.config import EpisodeConfig, NavRewardConfig
 from vinl.nav.environment import NavEnvironment
-from vinl.nav.robot_config import CameraConfig, ExecutionConfig, MotionConfig, ViewConfig
+from vinl.nav.robot_config import ExecutionConfig, MotionConfig, NavCameraConfig, ViewConfig
 from vinl.sensing.depth import DepthCamera
 from vinl.sensing.odometry_config import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig
@@ -21,7 +21,7 @@ PLANS = ("harbour_flat", "old_town")
 
 @pytest.mark.parametrize("pitch", [0.0, -0.26])
 def test_images_are_those_of_the_depth_camera(config, homes, pitch):
-    lens = CameraConfig(width=16, height=12, pitch_down=pitch)
+    lens = NavCameraConfig(width=16, height=12, pitch_down=pitch)
     config = replace(config, camera=lens, view=ViewConfig(ceiling_share=1.0, ceiling=(2.7, 2.7)))
     environment = NavEnvironment(config, homes)
     depth, _ = environment.observe()
@@ -169,7 +169,7 @@ def test_with_drift_the_robot_believes_otherwise_but_arrives_where_the_goal_is(c
 
 
 def test_reward_is_progress_and_the_goal_ends_the_episode(config, homes):
-    rewards = RewardConfig(success=10.0, progress=1.0, slack=-0.002, collision=-0.003, scale=0.2)
+    rewards = NavRewardConfig(success=10.0, progress=1.0, slack=-0.002, collision=-0.003, scale=0.2)
     config = replace(config, num_envs=200, camera=None, reward=rewards, episodes=EpisodeConfig(distance=(1.0, 6.0)))
     environment = NavEnvironment(config, homes)
     total, successes = 0.0, 0

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vinl.config.errors import InputError
-from vinl.world.geodesic import comfortable_path, distance_field, path_length, read_field, shortest_path
+from vinl.world.geodesic import comfortable_path, distance_field, path_length, read_field
 from vinl.world.grid import GridFrame
 
 FRAME = GridFrame(0.0, 0.0, 0.05, (80, 120))
@@ -32,11 +32,6 @@ def test_around_a_wall():
     field = distance_field(walled(), FRAME, goal)
     around = 2 * np.hypot(1.9, 2.5) + 0.2
     assert read_field(field, FRAME, start) == pytest.approx(around, rel=0.03)
-    path = shortest_path(field, FRAME, start)
-    assert np.allclose(path[0], start) and np.allclose(path[-1], goal)
-    assert path_length(path) == pytest.approx(float(read_field(field, FRAME, start)), rel=0.02)
-    assert np.linalg.norm(np.diff(path, axis=0), axis=1).max() <= 0.1 + 1e-9
-    assert np.isfinite(read_field(field, FRAME, path)).all()
 
 
 def test_the_comfortable_way_keeps_off_the_walls():
@@ -46,12 +41,12 @@ def test_the_comfortable_way_keeps_off_the_walls():
     clearance = np.asarray(distance_transform_edt(mask)) * 0.05
     start, goal = np.array([1.0, 1.0]), np.array([5.0, 1.0])
     path = comfortable_path(mask, clearance, FRAME, start, goal)
-    shortest = shortest_path(distance_field(mask, FRAME, goal), FRAME, start)
-    cell, other = FRAME.cell(path), FRAME.cell(shortest)
+    cell, shortest = FRAME.cell(path), float(read_field(distance_field(mask, FRAME, goal), FRAME, start))
     assert mask[cell[:, 0], cell[:, 1]].all()
-    assert clearance[cell[:, 0], cell[:, 1]].min() > clearance[other[:, 0], other[:, 1]].min()
-    assert path_length(path) < 1.15 * path_length(shortest)
+    assert clearance[cell[:, 0], cell[:, 1]].min() > 0.2  # the shortest one grazes the corner
+    assert shortest <= path_length(path) < 1.15 * shortest
     assert np.allclose(path[[0, -1]], [start, goal])
+    assert np.linalg.norm(np.diff(path, axis=0), axis=1).max() <= 0.1 + 1e-9
 
 
 def test_no_way_is_infinite_or_an_error():
@@ -59,8 +54,6 @@ def test_no_way_is_infinite_or_an_error():
     mask[:, 58:62] = False
     field = distance_field(mask, FRAME, np.array([5.0, 1.0]))
     assert np.isinf(field[20, 20]) and np.isinf(read_field(field, FRAME, np.array([1.0, 1.0])))
-    with pytest.raises(InputError):
-        shortest_path(field, FRAME, np.array([1.0, 1.0]))
     with pytest.raises(InputError):
         comfortable_path(mask, np.ones(FRAME.shape), FRAME, np.array([1.0, 1.0]), np.array([5.0, 1.0]))
     with pytest.raises(InputError, match="not on floor"):
@@ -71,4 +64,3 @@ def test_points_just_off_the_floor_are_moved_onto_it():
     goal = np.array([3.0, 0.5])  # in the wall
     field = distance_field(walled(), FRAME, goal)
     assert np.isfinite(read_field(field, FRAME, np.array([1.0, 1.0])))
-    assert len(shortest_path(field, FRAME, np.array([2.95, 0.5]))) >= 1

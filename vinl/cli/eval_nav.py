@@ -72,7 +72,7 @@ def main(argv: list[str]) -> int:
         load_navigator,
     )
     from vinl.nav.failures import count_failures, print_failures
-    from vinl.nav.measures import STUCK
+    from vinl.nav.measures import STUCK_STEPS
     from vinl.nav.report import (
         aggregate_by_distance,
         aggregate_navigation,
@@ -130,7 +130,7 @@ def main(argv: list[str]) -> int:
             "homes": homes,
             "homes_seed": options.homes_seed,
             "sets": options.sets,
-            "stuck_steps": STUCK,
+            "stuck_steps": STUCK_STEPS,
         },
         "policies": {"navigation": describe_policy(policy)},
         "environment": describe_environment(),

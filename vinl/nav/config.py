@@ -6,9 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from vinl.config.errors import InputError
-from vinl.nav.limits import Range, check_number, check_range
-from vinl.nav.ppo_config import NetworkConfig, PpoConfig
-from vinl.nav.robot_config import CameraConfig, ExecutionConfig, MotionConfig, RobotConfig, ViewConfig
+from vinl.config.limits import Range, check_number, check_range
+from vinl.nav.ppo_config import NavNetworkConfig, NavPpoConfig
+from vinl.nav.robot_config import ExecutionConfig, MotionConfig, NavCameraConfig, RobotConfig, ViewConfig
 from vinl.policies.card import PREVIOUS
 from vinl.sensing.odometry_config import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig
@@ -126,7 +126,7 @@ class ClutterConfig:
 
 
 @dataclass(frozen=True)
-class RewardConfig:
+class NavRewardConfig:
     """Reward of a step [facts/navigation 1.1, column A].
 
     Attributes:
@@ -171,16 +171,16 @@ class NavConfig:
     homes: HomesConfig = field(default_factory=HomesConfig)
     episodes: EpisodeConfig = field(default_factory=EpisodeConfig)
     robot: RobotConfig = field(default_factory=RobotConfig)
-    camera: CameraConfig | None = field(default_factory=CameraConfig)
+    camera: NavCameraConfig | None = field(default_factory=NavCameraConfig)
     sensors: SensorConfig = field(default_factory=SensorConfig)
     odometry: OdometryConfig = field(default_factory=OdometryConfig)
     motion: MotionConfig = field(default_factory=MotionConfig)
     execution: ExecutionConfig = field(default_factory=ExecutionConfig)
     clutter: ClutterConfig = field(default_factory=ClutterConfig)
     view: ViewConfig = field(default_factory=ViewConfig)
-    reward: RewardConfig = field(default_factory=RewardConfig)
-    network: NetworkConfig = field(default_factory=NetworkConfig)
-    ppo: PpoConfig = field(default_factory=PpoConfig)
+    reward: NavRewardConfig = field(default_factory=NavRewardConfig)
+    network: NavNetworkConfig = field(default_factory=NavNetworkConfig)
+    ppo: NavPpoConfig = field(default_factory=NavPpoConfig)
 
     def __post_init__(self) -> None:
         if self.iterations < 1:

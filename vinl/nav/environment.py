@@ -15,8 +15,7 @@ from vinl.nav.config import NavConfig
 from vinl.nav.home_store import HomeStore
 from vinl.nav.measures import EpisodeEnd, Measures, end_episodes
 from vinl.nav.motion_kernels import measure_robots, move_robots, place_robots
-from vinl.nav.robots import make_robots
-from vinl.nav.rules import write_rules
+from vinl.nav.structs import Robots, write_rules
 from vinl.nav.view_kernels import aim_cameras, draw_keys, render_interior
 from vinl.policies.places import blank_places, view_places, visit_places
 from vinl.robot.cameras import Camera
@@ -24,6 +23,7 @@ from vinl.sensing.depth import check_device
 from vinl.sensing.odometry import Odometry
 from vinl.sensing.preparation import settle_missing
 from vinl.sensing.sensor import DepthSensor
+from vinl.sensing.structs import allocate_struct
 
 _DRAWN_AT_START, _DRAWN_AT_LOOK = 1, 3
 """Rows of random numbers of a step: what the cameras are drawn from, and their images' errors."""
@@ -73,7 +73,7 @@ class NavEnvironment:
         num_envs: robots.
         camera: its record, or None if the robots are blind.
         ended: figures of the episodes that ended in the last step, see ``EpisodeEnd``; None before the first.
-        state: the robots' tensors by name, see ``robots.Robots``; to be read.
+        state: the robots' tensors by name, see ``structs.Robots``; to be read.
 
     Raises:
         InputError: the device is not there, or not the homes'.
@@ -89,7 +89,7 @@ class NavEnvironment:
         self.num_envs = n = config.num_envs
         self.camera: Camera | None = None if config.camera is None else config.camera.record()
         self._rules = write_rules(config)
-        self.state, self._robots = make_robots(n, self.device)
+        self._robots, self.state = allocate_struct(Robots, n, self.device)
         counts = ("steps", "path", "collisions", "in_a_row", "start_distance", "unplaced")
         self.state |= {name: self._zeros(n) for name in counts}
         self.state["action"] = self._zeros(n, 2)

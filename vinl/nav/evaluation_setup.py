@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from vinl.chain.navigators.base import ORACLE
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config, load_config
 from vinl.nav.config import EpisodeConfig, NavConfig
 from vinl.nav.home_store import HomeStore
-from vinl.nav.robot_config import CameraConfig
+from vinl.nav.robot_config import NavCameraConfig
 from vinl.policies.card import PolicyCard, find_previous
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
@@ -33,8 +34,6 @@ MOTIONS = {
 """How camera and robot move, and the config that says it: as recorded from the walking robot on clutter, the same with
 every step that touches cancelled as a whole, as recorded on level ground, not at all, or redrawn at each step [paper].
 """
-
-ORACLE = "oracle"
 
 
 @dataclass(frozen=True)
@@ -127,7 +126,7 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
         mount = {"mount_height": config.camera.mount_height}
         if rules.motion == "paper" and "mount_height" in trained:
             mount = {"mount_height": trained["mount_height"]}
-        camera = build_config(CameraConfig, {**known, "forward": card.camera["position"][0], **mount}, source="card")
+        camera = build_config(NavCameraConfig, {**known, "forward": card.camera["position"][0], **mount}, source="card")
     episodes: EpisodeConfig = replace(
         config.episodes, distance=rules.distance, steps=rules.steps, start_speed=(0.0, 0.0)
     )

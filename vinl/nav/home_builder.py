@@ -15,7 +15,7 @@ from scipy.ndimage import label
 from vinl.config.errors import InputError
 from vinl.nav.config import ClutterConfig, NavConfig
 from vinl.nav.fields import measure_near_clearance, spread_fields
-from vinl.nav.robot_config import CameraConfig
+from vinl.nav.robot_config import NavCameraConfig
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import RESOLUTION, FloorPlan
@@ -209,7 +209,7 @@ def prepare_home(plan: FloorPlan, seed: int, config: NavConfig) -> BuiltHome | s
     )
 
 
-def _draw_mesh(boxes: Boxes, camera: CameraConfig | None) -> tuple[np.ndarray, np.ndarray]:
+def _draw_mesh(boxes: Boxes, camera: NavCameraConfig | None) -> tuple[np.ndarray, np.ndarray]:
     """The boxes without the faces that the camera never sees: bottoms on the floor, tops far above it. Fewer triangles
     make quicker rays."""
     vertices, faces = box_mesh(boxes)

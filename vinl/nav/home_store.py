@@ -87,10 +87,9 @@ class HomeStore:
         for begin, end, home in zip(first, ends, built, strict=True):
             self._tensors["fields"][begin:end] = torch.from_numpy(home.fields).flatten(0, 1)
             self._tensors["clearance"][4 * begin : 4 * end] = torch.from_numpy(home.clearance).flatten()
-        vectors = {"shape": wp.vec2i, "origin": wp.vec2, "goals": wp.vec2, "starts": wp.vec2, "meshes": wp.uint64}
         self.homes = Homes()
         for name, tensor in self._tensors.items():
-            setattr(self.homes, name, wp.from_torch(tensor, dtype=vectors.get(name)))
+            setattr(self.homes, name, wp.from_torch(tensor, dtype=Homes.vars[name].type.dtype))
 
     @classmethod
     def build(

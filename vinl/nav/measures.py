@@ -10,7 +10,7 @@ from torch import Tensor
 
 from vinl.world.endings import LOOPING_WAYS
 
-STUCK = 10
+STUCK_STEPS = 10
 """An episode that runs out of time after at least so many cancelled steps in a row counts as stuck."""
 
 _NAMES = (
@@ -81,7 +81,7 @@ def end_episodes(
     efficiency = start / torch.maximum(path, start)
     progress = (1.0 - end / start).clamp(0.0, 1.0)
     late = 1.0 - reached
-    stuck = late * (in_a_row >= STUCK)
+    stuck = late * (in_a_row >= STUCK_STEPS)
     looping = late * (1.0 - stuck) * (path > LOOPING_WAYS * start)
     return EpisodeEnd(
         counted=counted,

@@ -10,54 +10,11 @@ from typing import no_type_check
 import warp as wp
 
 from vinl.nav.grids import FIELD, NOWHERE, Homes, read_distance, touches
-from vinl.nav.robots import Robots
+from vinl.nav.structs import Robots, Rules
 from vinl.sensing.warp_start import start_warp
 
 start_warp()
 wp.set_module_options({"enable_backward": False})
-
-
-@wp.struct
-@no_type_check
-class Rules:
-    """Numbers of the configuration."""
-
-    length: wp.float32
-    width: wp.float32
-    min_speed: wp.float32
-    max_speed: wp.float32
-    max_yaw_rate: wp.float32
-    period: wp.float32
-    success_radius: wp.float32
-    least: wp.float32  # distance at the start
-    most: wp.float32
-    start_speed: wp.vec2
-    lag: wp.float32
-    speed_gain: wp.vec2
-    yaw_gain: wp.vec2
-    speed_noise: wp.float32
-    yaw_noise: wp.float32
-    side_slip: wp.float32
-    yaw_drift: wp.float32
-    execution_amplitude: wp.vec2
-    give_way: wp.float32
-    sees_motion: wp.int32
-    tilt: wp.vec2
-    tilt_offset: wp.vec2
-    tilt_shake: wp.vec2
-    correlation: wp.float32
-    amplitude: wp.vec2
-    tilt_uniform: wp.float32
-    height_offset: wp.float32
-    height_shake: wp.float32
-    with_trunk: wp.int32
-    forward: wp.float32
-    mount_height: wp.float32
-    pitch_down: wp.float32
-    tan_half: wp.vec2
-    far: wp.float32
-    ceiling_share: wp.float32
-    ceiling: wp.vec2
 
 
 @wp.func

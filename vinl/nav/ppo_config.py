@@ -9,10 +9,11 @@ from vinl.config.errors import InputError
 
 VISIONS, MEMORIES = ("resnet18", "cnn"), ("lstm", "mlp")
 IMAGE_TYPES = ("float16", "uint8")
+"""How a roll-out keeps images: half precision, or bytes of 1/255 of the range."""
 
 
 @dataclass(frozen=True)
-class NetworkConfig:
+class NavNetworkConfig:
     """Sizes of the navigator [ViNL resnet_policy.py]. A config without camera gets no image part.
 
     Attributes:
@@ -48,7 +49,7 @@ class NetworkConfig:
 
 
 @dataclass(frozen=True)
-class PpoConfig:
+class NavPpoConfig:
     """Proximal policy optimisation over whole sequences.
 
     Attributes:

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
-from vinl.nav.ppo_config import PpoConfig
+from vinl.nav.ppo_config import NavPpoConfig
 from vinl.nav.recurrent_model import RecurrentActorCritic
 from vinl.nav.recurrent_storage import RecurrentStorage
 from vinl.policies.nav_actor import NavActor
@@ -49,7 +49,7 @@ class RecurrentPPO:
         model: RecurrentActorCritic,
         storage: RecurrentStorage,
         rate: DeviceRate,
-        config: PpoConfig,
+        config: NavPpoConfig,
         peers: Peers | None = None,
     ) -> None:
         if storage.robots % config.minibatches:
@@ -243,7 +243,7 @@ class RecurrentPPO:
             self._sums += torch.stack([surrogate, value_loss, entropy, guess_loss, kl, clipped, norm])
 
 
-def count_guesses(config: PpoConfig) -> int:
+def count_guesses(config: NavPpoConfig) -> int:
     """Hidden numbers that the feature is to tell: where the robot has been, if that has a weight."""
     return VIEW**2 if config.places > 0 else 0
 

@@ -10,9 +10,6 @@ from torch import Tensor
 
 from vinl.policies.depth_memory import State
 
-IMAGE_TYPES = {"float16": torch.float16, "uint8": torch.uint8}
-"""How images are kept: half precision, or bytes of 1/255 of the range."""
-
 
 class Minibatch(NamedTuple):
     """All steps of some of the robots; arguments of the model first. Shapes (t, n, ...), the state (layers, n, ...)."""
@@ -36,7 +33,7 @@ class RecurrentStorage:
     Args:
         steps, robots: t and n.
         image: (height, width) of the images, or None.
-        image_type: a key of ``IMAGE_TYPES``.
+        image_type: one of ``ppo_config.IMAGE_TYPES``.
         vector, actions, hidden: sizes; ``hidden`` 0: there is none.
         state: of the robots at the start; its shapes are taken.
         device: where the buffers lie.
@@ -58,7 +55,7 @@ class RecurrentStorage:
             return torch.zeros(steps, robots, *size, dtype=dtype, device=device)
 
         self.steps, self.robots = steps, robots
-        self.depth = room(*image, dtype=IMAGE_TYPES[image_type]) if image else None
+        self.depth = room(*image, dtype=getattr(torch, image_type)) if image else None
         self.vector, self.actions, self.means = room(vector), room(actions), room(actions)
         self.hidden = room(hidden) if hidden else None
         self.fresh, self.done = room(dtype=torch.bool), room(dtype=torch.bool)

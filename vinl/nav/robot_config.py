@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 from vinl.config.errors import InputError
-from vinl.nav.limits import Range, check_number, check_range
+from vinl.config.limits import Range, check_number, check_range
 from vinl.robot.cameras import Camera
 
 Pair = tuple[float, float]
@@ -42,7 +42,7 @@ class RobotConfig:
 
 
 @dataclass(frozen=True)
-class CameraConfig:
+class NavCameraConfig:
     """The depth camera in its resting pose.
 
     Attributes:

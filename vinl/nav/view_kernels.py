@@ -9,8 +9,8 @@ from typing import no_type_check
 import warp as wp
 
 from vinl.nav.grids import Homes
-from vinl.nav.motion_kernels import Rules, place_after
-from vinl.nav.robots import Robots
+from vinl.nav.motion_kernels import place_after
+from vinl.nav.structs import Robots, Rules
 from vinl.sensing.kernels import look_through
 from vinl.sensing.sensor_kernels import Cameras
 from vinl.sensing.warp_start import start_warp

@@ -11,7 +11,7 @@ from safetensors.torch import load_file, save_file
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
 from vinl.nav.recurrent_model import RecurrentActorCritic
-from vinl.nav.robot_config import CameraConfig
+from vinl.nav.robot_config import NavCameraConfig
 from vinl.policies.card import PolicyCard
 from vinl.policies.io import load_policy
 from vinl.policies.nav_actor import PREVIOUS_SIZE, NavActor
@@ -41,7 +41,7 @@ def build_actor(config: NavConfig) -> NavActor:
 
 
 def _map_geometry(config: NavConfig) -> MapGeometry:
-    c, robot = config.camera or CameraConfig(), config.robot
+    c, robot = config.camera or NavCameraConfig(), config.robot
     return MapGeometry(
         robot.min_speed,
         robot.max_speed,

@@ -12,13 +12,11 @@ from torch import Tensor
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.policies.card import PolicyCard
+from vinl.policies.depth_memory import State
 from vinl.policies.networks import PolicyNetwork
 from vinl.policies.policy import A
 from vinl.robot.cameras import Camera
 from vinl.sensing.preparation import prepare_depth
-
-State = tuple[Tensor, ...]
-"""What a network remembers: tensors (layers, n, hidden), one column a robot; none without memory."""
 
 
 @runtime_checkable

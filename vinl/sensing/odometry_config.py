@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from vinl.config.errors import InputError
+from vinl.config.limits import Range, check_number, check_range
 
 
 @dataclass(frozen=True)
@@ -19,15 +18,12 @@ class OdometryConfig:
             as much again to the side as along the way.
     """
 
-    drift: tuple[float, float] = (0.0, 0.0)
+    drift: Range = (0.0, 0.0)
     yaw_bias: float = 0.1
 
     def __post_init__(self) -> None:
-        low, high = self.drift
-        if not (math.isfinite(low) and math.isfinite(high) and 0.0 <= low <= high <= 0.5):
-            raise InputError(f"odometry.drift must be a rising range within 0 to 0.5, got {low:g} to {high:g}")
-        if not 0.0 <= self.yaw_bias <= 1.0:
-            raise InputError(f"odometry.yaw_bias must lie between 0 and 1, got {self.yaw_bias:g}")
+        check_range("odometry.drift", self.drift, 0.0, 0.5)
+        check_number("odometry.yaw_bias", self.yaw_bias, 0.0, 1.0)
 
     @property
     def is_exact(self) -> bool:

@@ -12,15 +12,7 @@ from torch import Tensor
 from vinl.robot.cameras import Camera
 from vinl.sensing.sensor_config import SensorConfig
 from vinl.sensing.sensor_kernels import PATCHES, Cameras, SensorRules, draw_cameras, draw_patches, spoil_depth
-
-_DRAWN = {
-    "amplitude": (torch.float32, (), None),
-    "scale": (torch.float32, (), None),
-    "offset": (torch.float32, (3,), wp.vec3),
-    "delay": (torch.float32, (), None),
-    "surfaces": (torch.int32, (), None),
-}
-"""Type and shape of each entry of ``Cameras`` for one camera, and what a row of it is to Warp."""
+from vinl.sensing.structs import allocate_struct, fill_struct
 
 
 class DepthSensor:
@@ -40,14 +32,9 @@ class DepthSensor:
 
     def __init__(self, config: SensorConfig, camera: Camera, n: int, device: torch.device | str = "cpu") -> None:
         self.config, self._camera, self._device = config, camera, torch.device(device)
-        self.drawn = {
-            name: torch.zeros(n, *shape, dtype=dtype, device=device) for name, (dtype, shape, _) in _DRAWN.items()
-        }
+        self.cameras, self.drawn = allocate_struct(Cameras, n, device)
         self.drawn["scale"].fill_(1.0)
-        self.cameras = Cameras()
-        for name, (_, _, vector) in _DRAWN.items():
-            setattr(self.cameras, name, wp.from_torch(self.drawn[name], dtype=vector))
-        self._rules = _write_rules(config)
+        self._rules = fill_struct(SensorRules, vars(config))
         self._lost = camera.far if camera.missing == "as_is" else 0.0
 
     def restart(self, key: Int[Tensor, " n"], chosen: Bool[Tensor, " n"]) -> None:
@@ -108,10 +95,3 @@ class DepthSensor:
         on_gpu = self._device.type == "cuda"
         stream = wp.stream_from_torch(torch.cuda.current_stream(self._device)) if on_gpu else None
         wp.launch(kernel, dim=dim, inputs=inputs, device=str(self._device), stream=stream)
-
-
-def _write_rules(config: SensorConfig) -> Any:
-    rules = SensorRules()
-    for name, value in vars(config).items():
-        setattr(rules, name, wp.vec2(*value) if isinstance(value, tuple) else value)
-    return rules

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from vinl.config.errors import InputError
+from vinl.config.limits import Range, check_number, check_range
 from vinl.config.loader import load_config
 
-Range = tuple[float, float]
-"""From least to most."""
-
-LIMITS = {
+_LIMITS = {
     "noise": (0.0, 1.0),
     "scale": (0.0, 0.5),
     "pixels": (0.0, 1.0),
@@ -23,7 +19,7 @@ LIMITS = {
 }
 """Limits of the single numbers of ``SensorConfig``."""
 
-RANGES = {
+_RANGES = {
     "patch_size": (0.01, 1.0),
     "range": (0.0, 1000.0),
     "delay": (0.0, 0.4),
@@ -79,16 +75,10 @@ class SensorConfig:
     amplitude: Range = (1.0, 1.0)
 
     def __post_init__(self) -> None:
-        for name, (least, most) in LIMITS.items():
-            value = getattr(self, name)
-            if not (math.isfinite(value) and least <= value <= most):
-                raise InputError(f"sensors.{name} must lie between {least:g} and {most:g}, got {value:g}")
-        for name, (least, most) in RANGES.items():
-            low, high = getattr(self, name)
-            if not (math.isfinite(low) and math.isfinite(high) and least <= low <= high <= most):
-                raise InputError(
-                    f"sensors.{name} must be a rising range within {least:g} to {most:g}, got {low:g} to {high:g}"
-                )
+        for name, limits in _LIMITS.items():
+            check_number(f"sensors.{name}", getattr(self, name), *limits)
+        for name, limits in _RANGES.items():
+            check_range(f"sensors.{name}", getattr(self, name), *limits)
 
     @property
     def is_ideal(self) -> bool:

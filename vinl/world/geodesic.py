@@ -63,28 +63,6 @@ def read_field(
     return np.asarray(best)
 
 
-def shortest_path(
-    field: Float[np.ndarray, "rows columns"], frame: GridFrame, start_xy: Float[np.ndarray, " 2"]
-) -> Float[np.ndarray, "k 2"]:
-    """The shortest way from a start to the goal of a distance field, corners cut as far as the floor allows.
-
-    Args:
-        field: what ``distance_field`` returned.
-        frame: where the cells lie.
-        start_xy: start [m]; off the reachable floor, the nearest cell within ``SNAP`` stands for it.
-
-    Returns:
-        Points [m] at most ``PATH_SPACING`` apart, start and goal included.
-
-    Raises:
-        InputError: if the goal cannot be reached from there.
-    """
-    reachable = np.isfinite(field)
-    start = _nearest_cell(reachable, frame, start_xy)
-    cells = _descend(field / frame.resolution, start)
-    return _resample(frame.xy(_pull_string(reachable, cells)))
-
-
 def comfortable_path(
     traversable: Bool[np.ndarray, "rows columns"],
     clearance: Float[np.ndarray, "rows columns"],
@@ -182,26 +160,6 @@ def _nearest_cell(mask: np.ndarray, frame: GridFrame, xy: Float[np.ndarray, " 2"
         if way.min() <= SNAP:
             return int(near[way.argmin(), 0]), int(near[way.argmin(), 1])
     raise InputError(f"the point ({xy[0]:.2f}, {xy[1]:.2f}) m is not on floor that the robot can reach")
-
-
-def _sees(mask: np.ndarray, a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether the straight line between two cells stays on the mask."""
-    n = int(np.abs(b - a).max()) * 2 + 1
-    line = np.rint(a + (b - a) * np.linspace(0, 1, n)[:, None]).astype(int)
-    return bool(mask[line[:, 0], line[:, 1]].all())
-
-
-def _pull_string(mask: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Keep only the corners that the straight line cannot skip."""
-    kept, at = [0], 0
-    while at < len(cells) - 1:
-        low, high = at + 1, len(cells) - 1
-        while low < high:
-            middle = (low + high + 1) // 2
-            low, high = (middle, high) if _sees(mask, cells[at], cells[middle]) else (low, middle - 1)
-        at = low
-        kept.append(at)
-    return cells[kept]
 
 
 def _resample(points: np.ndarray, spacing: float = PATH_SPACING) -> np.ndarray:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 from vinl.config.errors import InputError
+from vinl.config.limits import Range, check_number, check_range
 
 RANGES = {
     "area": (30.0, 1000.0),
@@ -52,20 +52,20 @@ class HomeConfig:
     """
 
     layout: str = "home"
-    area: tuple[float, float] = (40.0, 250.0)
-    door_width: tuple[float, float] = (0.75, 1.2)
-    door_height: tuple[float, float] = (1.95, 2.2)
-    wall_height: tuple[float, float] = (2.3, 3.4)
-    inner_wall: tuple[float, float] = (0.08, 0.2)
-    outer_wall: tuple[float, float] = (0.15, 0.3)
-    corridor_width: tuple[float, float] = (1.1, 1.9)
+    area: Range = (40.0, 250.0)
+    door_width: Range = (0.75, 1.2)
+    door_height: Range = (1.95, 2.2)
+    wall_height: Range = (2.3, 3.4)
+    inner_wall: Range = (0.08, 0.2)
+    outer_wall: Range = (0.15, 0.3)
+    corridor_width: Range = (1.1, 1.9)
     corridor_share: float = 0.45
     l_shape_share: float = 0.35
     open_plan_share: float = 0.35
     loft_share: float = 0.12
     passage_share: float = 0.3
     loop_share: float = 0.3
-    furniture_density: tuple[float, float] = (0.4, 1.7)
+    furniture_density: Range = (0.4, 1.7)
     bare_share: float = 0.06
     askew_share: float = 0.1
 
@@ -73,14 +73,10 @@ class HomeConfig:
         if self.layout not in LAYOUTS:
             raise InputError(f"homes: layout must be one of {', '.join(LAYOUTS)}, got {self.layout!r}")
         for name, (least, most) in RANGES.items():
-            low, high = getattr(self, name)
-            if not (math.isfinite(low) and math.isfinite(high) and least <= low <= high <= most):
-                raise InputError(
-                    f"homes: {name} must be a rising range between {least:g} and {most:g}, got ({low:g}, {high:g})"
-                )
+            check_range(f"homes: {name}", getattr(self, name), least, most)
         for name in vars(self):
-            if name.endswith("_share") and not 0.0 <= getattr(self, name) <= 1.0:
-                raise InputError(f"homes: {name} must lie between 0 and 1, got {getattr(self, name):g}")
+            if name.endswith("_share"):
+                check_number(f"homes: {name}", getattr(self, name), 0.0, 1.0)
         if self.area[1] < 1.05 * self.area[0]:
             raise InputError(f"homes: area needs some room between least and most, got {self.area}")
         if self.door_height[1] > self.wall_height[0]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from random import Random
 
 from vinl.world.homes import catalogue as make
@@ -53,7 +53,6 @@ class Floor:
     rects: list[Rect]
     faces: list[Face]
     taken: list[Rect]
-    wall_taken: list[Rect] = field(default_factory=list)
 
 
 def furnish(rng: Random, shell: Shell, config: HomeConfig) -> list[Piece]:
