@@ -23,7 +23,6 @@ from rich.console import Console
 from rich.table import Table
 
 from vinl.chain.choose import check_locomotion_policy
-from vinl.chain.config import MAX_TILT
 from vinl.chain.workers import one_thread
 from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import COMMANDS, Course, Start, choose_commands, command_ranges
@@ -36,6 +35,7 @@ from vinl.loco.simulation import PAST, Body, Simulation
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, STANDING_HEIGHT, home_qpos
+from vinl.world.endings import MAX_TILT
 
 FIGURES = (
     ("fall_count", "falls"),

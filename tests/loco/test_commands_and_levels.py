@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vinl.config.errors import InputError
-from vinl.loco.commands import draw_commands
-from vinl.loco.config import AnnealConfig, CommandConfig, CurriculumConfig, RandomisationConfig, RewardConfig
+from vinl.loco.config import AnnealConfig, CurriculumConfig, RandomisationConfig, RewardConfig
 from vinl.loco.curriculum import next_levels
+from vinl.loco.randomisation import draw_commands
+from vinl.robot.commands import CommandConfig
 
 
 def test_commands_keep_to_their_ranges_and_shares():

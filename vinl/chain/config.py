@@ -9,9 +9,7 @@ from vinl.chain.fault_config import FaultConfig
 from vinl.config.errors import InputError
 from vinl.sensing.odometry_config import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig
-
-MAX_TILT = math.radians(72)
-"""A trunk tilted farther than this has fallen [rad]."""
+from vinl.world.endings import MAX_TILT
 
 
 @dataclass(frozen=True)

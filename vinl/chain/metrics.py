@@ -9,6 +9,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy import stats
 
+from vinl.robot.rotation import yaw_of
+
 BOOTSTRAP = 2000
 """Resamples of the bootstrap."""
 
@@ -28,6 +30,17 @@ def soft_spl(geodesic_m: float, left_m: float, distance_m: float) -> float:
     """
     progress = 1.0 - left_m / max(geodesic_m, 1e-9)
     return min(max(progress, 0.0), 1.0) * geodesic_m / max(geodesic_m, distance_m, 1e-9)
+
+
+def tracking_errors(
+    qpos: Float[np.ndarray, "n 19"], qvel: Float[np.ndarray, "n 18"], command: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "n 2"]:
+    """Squared errors of the horizontal velocity in the heading frame [m2/s2] and of the yaw rate [rad2/s2]."""
+    yaw = yaw_of(np, qpos[:, 3:7])
+    c, s = np.cos(yaw), np.sin(yaw)
+    ahead, left = c * qvel[:, 0] + s * qvel[:, 1], -s * qvel[:, 0] + c * qvel[:, 1]
+    linear = (ahead - command[:, 0]) ** 2 + (left - command[:, 1]) ** 2
+    return np.stack([linear, (qvel[:, 5] - command[:, 2]) ** 2], 1)
 
 
 def wilson_interval(successes: int, n: int) -> tuple[float, float]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
-from jaxtyping import Float
 
 from vinl.chain.batching import ask_only, batch_navigator, batch_policy
 from vinl.chain.config import EvaluationConfig
@@ -15,6 +14,7 @@ from vinl.chain.depth_cameras import open_depth_cameras
 from vinl.chain.episode import EpisodeSetup, draw_faults, sensor_key
 from vinl.chain.fault_config import FaultConfig
 from vinl.chain.faults import FaultyState, change_body
+from vinl.chain.metrics import tracking_errors
 from vinl.chain.navigators.base import Navigator, Task, decide
 from vinl.chain.real_cameras import CameraErrors
 from vinl.chain.recorder import Recorder
@@ -139,14 +139,3 @@ def _spawn_robots(
         robot.spawn(float(setup.route.start[0]), float(setup.route.start[1]), setup.yaw, setup.joints)
         robots.append(robot)
     return robots
-
-
-def tracking_errors(
-    qpos: Float[np.ndarray, "n 19"], qvel: Float[np.ndarray, "n 18"], command: Float[np.ndarray, "n 3"]
-) -> Float[np.ndarray, "n 2"]:
-    """Squared errors of the horizontal velocity in the heading frame [m2/s2] and of the yaw rate [rad2/s2]."""
-    yaw = yaw_of(np, qpos[:, 3:7])
-    c, s = np.cos(yaw), np.sin(yaw)
-    ahead, left = c * qvel[:, 0] + s * qvel[:, 1], -s * qvel[:, 0] + c * qvel[:, 1]
-    linear = (ahead - command[:, 0]) ** 2 + (left - command[:, 1]) ** 2
-    return np.stack([linear, (qvel[:, 5] - command[:, 2]) ** 2], 1)

@@ -13,6 +13,7 @@ from vinl.config.fields import closest
 from vinl.courses.grounds import Ground
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, home_qpos
+from vinl.robot.commands import UNIFORM, CommandConfig, make_commands
 from vinl.robot.kinematics import foot_positions
 
 FOOT_CLEARANCE = 0.06
@@ -26,27 +27,18 @@ _START_STREAM, _COMMAND_STREAM = 0, 1
 
 
 @dataclass(frozen=True)
-class CommandRanges:
-    """Uniformly drawn commands.
+class CommandRanges(CommandConfig):
+    """Commands of a trial.
 
     Attributes:
-        forward, left: ranges of the linear velocity [m/s].
-        yaw_rate: range of the turning rate [rad/s].
-        min_speed: slower linear commands become zero [m/s].
-        hold: range of the time until the next command [s].
-        hold_step: the time is rounded to multiples of this [s].
-        stand_share: fraction of the commands that are zero.
-        turn_share: fraction of the commands that only turn on the spot.
+        hold_step: the time until the next command is rounded to multiples of this [s].
     """
 
-    forward: tuple[float, float] = (-1.0, 1.0)
-    left: tuple[float, float] = (-1.0, 1.0)
-    yaw_rate: tuple[float, float] = (-1.0, 1.0)
-    min_speed: float = 0.0
     hold: tuple[float, float] = (5.0, 10.0)
-    hold_step: float = CONTROL_DT
+    min_speed: float = 0.0
     stand_share: float = 0.0
     turn_share: float = 0.0
+    hold_step: float = CONTROL_DT
 
 
 _LEVEL, _TURN = (0.0, 0.0), (-np.pi / 3, np.pi / 3)
@@ -100,7 +92,7 @@ def command_ranges(name: str, policies: Sequence[Policy]) -> CommandRanges:
 
     left = _LEVEL if name == "forward" else common("left")
     slowest = max(float(t.get("min_speed", 0.2)) for t in trained)
-    return CommandRanges(common("forward"), left, common("yaw_rate"), slowest)
+    return CommandRanges(common("forward"), left, common("yaw_rate"), min_speed=slowest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,15 +176,9 @@ def draw_commands(
     commands, fresh = np.zeros((steps, 3)), np.zeros(steps, bool)
     step = 0
     while step < steps:
-        command = np.array([rng.uniform(*ranges.forward), rng.uniform(*ranges.left), rng.uniform(*ranges.yaw_rate)])
-        share, hold = rng.uniform(), rng.uniform(*ranges.hold)
-        if np.hypot(command[0], command[1]) < ranges.min_speed or share < ranges.stand_share + ranges.turn_share:
-            command[:2] = 0.0
-        if share < ranges.stand_share:
-            command[2] = 0.0
+        command, held = make_commands(np, ranges, rng.random(len(UNIFORM)), ranges.hold_step)
         commands[step:], fresh[step] = command, True
-        held = max(round(hold / ranges.hold_step), 1) * ranges.hold_step
-        step += max(round(held / CONTROL_DT), 1)
+        step += int(held)
     return commands, fresh
 
 

@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vinl.chain.config import MAX_TILT
 from vinl.chain.robot import Robot, Robots
 from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import Start
 from vinl.courses.strain import Strain, StrainReader
+from vinl.world.endings import MAX_TILT
 
 
 @runtime_checkable

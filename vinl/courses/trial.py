@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 from vinl.chain.controller import LocomotionController
 from vinl.chain.depth_cameras import DepthCameras
 from vinl.chain.gait_reader import GaitReader, map_ground
+from vinl.chain.metrics import tracking_errors
 from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import Course
 from vinl.courses.gait_metrics import record_gait
@@ -19,7 +20,6 @@ from vinl.courses.robot_records import FRONT, REAR, RobotRecord
 from vinl.courses.step_counter import StepCounter
 from vinl.policies.card import find_detour, find_gait, reads_ground
 from vinl.policies.policy import Policy
-from vinl.robot.rotation import rotate_inverse
 from vinl.world.heightfield import WALL
 
 LEAD = 0.5
@@ -137,10 +137,8 @@ def _add_errors(
     command: Float[np.ndarray, "n 3"],
     settled: Bool[np.ndarray, " n"],
 ) -> None:
-    """Squared errors of the velocity in the trunk frame, which training rewards, and of the yaw rate."""
-    velocity = rotate_inverse(np, qpos[:, 3:7], qvel[:, :3])
-    linear, yaw = ((velocity[:, :2] - command[:, :2]) ** 2).sum(1), (qvel[:, 5] - command[:, 2]) ** 2
-    for record, a, b, calm in zip(records, linear.tolist(), yaw.tolist(), settled.tolist(), strict=True):
+    errors = tracking_errors(qpos, qvel, command)
+    for record, (a, b), calm in zip(records, errors.tolist(), settled.tolist(), strict=True):
         record.steps += 1
         record.errors[0] += a
         record.errors[1] += b

@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.chain.choose import check_locomotion_policy
-from vinl.chain.config import MAX_TILT
 from vinl.chain.controller import open_controller
 from vinl.chain.robot import Robot, Robots
 from vinl.chain.scene import build_scene
@@ -19,6 +18,7 @@ from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
 from vinl.robot.rotation import matrix_of, yaw_of
 from vinl.world.boxes import Boxes
 from vinl.world.clutter import CLUTTER, scatter_blocks
+from vinl.world.endings import MAX_TILT
 from vinl.world.floorplan import FloorPlan, assemble_floorplan, frame_around
 
 PERIOD = 25

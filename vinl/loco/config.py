@@ -9,9 +9,8 @@ from vinl.config.errors import InputError
 from vinl.gait.config import GaitConfig
 from vinl.loco.student_config import StudentConfig
 from vinl.robot.aliengo import KD, KP
+from vinl.robot.commands import CommandConfig, Range
 from vinl.world.terrain import TerrainConfig
-
-Range = tuple[float, float]
 
 MAX_LATENCY = 0.04
 """Longest time from an observation to its action's effect that is simulated [s]: two control steps."""
@@ -20,37 +19,6 @@ MAX_LATENCY = 0.04
 def _check_range(name: str, value: Range) -> None:
     if not value[0] <= value[1]:
         raise InputError(f"{name} must be a rising range, got {value[0]} to {value[1]}")
-
-
-@dataclass(frozen=True)
-class CommandConfig:
-    """Velocity commands, drawn uniformly and held for a while.
-
-    Attributes:
-        forward, left: ranges of the linear velocity [m/s].
-        yaw_rate: range of the turning rate [rad/s].
-        hold: range of the time until the next command [s].
-        min_speed: slower linear commands become zero [m/s] [legged_gym: 0.2].
-        stand_share: share of commands that are zero.
-        turn_share: share of commands that only turn on the spot.
-    """
-
-    forward: Range = (-1.0, 1.0)
-    left: Range = (-1.0, 1.0)
-    yaw_rate: Range = (-1.0, 1.0)
-    hold: Range = (2.0, 10.0)
-    min_speed: float = 0.2
-    stand_share: float = 0.05
-    turn_share: float = 0.1
-
-    def __post_init__(self) -> None:
-        for name in ("forward", "left", "yaw_rate", "hold"):
-            _check_range(f"commands.{name}", getattr(self, name))
-        if self.hold[0] <= 0:
-            raise InputError(f"commands.hold must be positive, got {self.hold[0]}")
-        shares = self.stand_share, self.turn_share
-        if min(shares) < 0 or sum(shares) > 1:
-            raise InputError("commands: stand_share and turn_share must be shares that add up to at most 1")
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,11 @@ from jaxtyping import Array, Float, UInt8
 
 from vinl.gait.observation import GAIT_ROWS, STEPPING_MAP_TABLE, insert_gait, observe_gait
 from vinl.gait.state import GaitState, feet_in_heading_frame
-from vinl.loco.commands import draw_commands
 from vinl.loco.config import MAX_LATENCY, LocoConfig, RandomisationConfig, RewardConfig
 from vinl.loco.curriculum import next_levels
 from vinl.loco.lost import KEPT, REASONS, Lost, keep_lost
 from vinl.loco.measures import TERMS, average_sums, sum_measures, tile_cover
-from vinl.loco.randomisation import split_by_name, uniform
+from vinl.loco.randomisation import draw_commands, split_by_name, uniform
 from vinl.loco.rewards import Motion, reward_terms
 from vinl.loco.simulation import Body, Contacts, Ground, Simulation, delay_steps
 from vinl.loco.state import State, begin_episode, count_steps, first_state, strip_weak_types
@@ -28,6 +27,7 @@ from vinl.robot.observation import CLIP, HEIGHT_SCAN, observe
 from vinl.robot.rotation import rotate_inverse
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.clearance import FAR
+from vinl.world.endings import MAX_TILT
 from vinl.world.terrain import build_terrain
 
 _EDGE = 2.0
@@ -41,8 +41,8 @@ PRIVILEGED = 16 + 3 + 8
 
 _VELOCITY = STEPPING_MAP_TABLE.place("base_linear_velocity")
 
-_UPSIDE = -0.3
-"""Third component of the gravity vector in the trunk above which the robot has fallen: tilted by more than 72 deg."""
+_UPSIDE = -math.cos(MAX_TILT)
+"""Third component of the gravity vector in the trunk above which the robot has fallen."""
 
 
 class Observations(NamedTuple):

@@ -6,9 +6,10 @@ from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
-from vinl.loco.config import RandomisationConfig, Range
+from vinl.loco.config import RandomisationConfig
+from vinl.robot.commands import UNIFORM, CommandConfig, Range, make_commands
 
 Keys = TypeVar("Keys", bound=tuple)
 
@@ -21,6 +22,12 @@ def split_by_name(kind: type[Keys], key: Array) -> Keys:
 def uniform(key: Array, shape: tuple[int, ...], bounds: Range) -> Array:
     """Numbers drawn uniformly from a range."""
     return jax.random.uniform(key, shape, minval=bounds[0], maxval=bounds[1])
+
+
+def draw_commands(config: CommandConfig, key: Array, n: int) -> tuple[Float[Array, "n 3"], Int[Array, " n"]]:
+    """New commands of n robots, and control steps until the next ones, see ``make_commands``."""
+    drawn = [jax.random.uniform(part, (n,)) for part in jax.random.split(key, len(UNIFORM))]
+    return make_commands(jnp, config, jnp.stack(drawn, -1))
 
 
 class Traits(NamedTuple):

@@ -8,10 +8,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from vinl.loco.commands import draw_commands
 from vinl.loco.config import LocoConfig, RandomisationConfig
 from vinl.loco.measures import MEASURES, TERMS
-from vinl.loco.randomisation import Traits, draw_traits, split_by_name, uniform
+from vinl.loco.randomisation import Traits, draw_commands, draw_traits, split_by_name, uniform
 from vinl.loco.simulation import PAST, Body
 from vinl.loco.walking import Walk, start_walk
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 SUCCESS, FALL, STUCK, LOOPING, TIMEOUT = "success", "fall", "stuck", "looping", "timeout"
 END_REASONS = (SUCCESS, FALL, STUCK, LOOPING, TIMEOUT)
 """The last three are all episodes that ran out of time, told apart by what the robot did with it."""
+
+MAX_TILT = math.radians(72)
+"""A trunk tilted farther than this has fallen [rad], in training and in every evaluation."""
 
 LOOPING_WAYS = 3.0
 """A robot that ran out of time and was not stuck, but moved more than so many times the shortest way, went in circles
