@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from vinl.benchmark.evaluate import evaluate
+from vinl.benchmark.folders import results_as_dict
 from vinl.benchmark.report import render_report
-from vinl.benchmark.results_file import results_as_dict
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.records import Results
 from vinl.config.output import check_out, strip_command, write_json

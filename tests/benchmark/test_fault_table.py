@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vinl.benchmark.fault_table import IDEAL, FaultMatrix
+from vinl.benchmark.table_config import IDEAL, FaultMatrix
 from vinl.benchmark.work import Row
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.fault_config import FaultConfig

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from small_home import RECORD
 
-from vinl.benchmark.paired import compare_rows, difference, mcnemar_p
+from vinl.benchmark.metrics import compare_rows, difference, mcnemar_p
 
 
 def make(outcomes: str, steps: int = 0) -> list:

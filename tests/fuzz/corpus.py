@@ -110,7 +110,7 @@ def _configs() -> Iterator[Reader]:
 
 
 def _results(folder: Path) -> Iterator[Reader]:
-    from vinl.benchmark.combine import read_folders
+    from vinl.benchmark.folders import read_folders
 
     files = {str(f.relative_to(folder)): f.read_bytes() for f in sorted(folder.rglob("*.json*")) if f.is_file()}
     read = {name: data for name, data in files.items() if name in ("run.json", "episodes.jsonl")}

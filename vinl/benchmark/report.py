@@ -1,28 +1,48 @@
-"""``report.html``: one self-contained page with table, maps and histograms."""
+"""What an evaluation shows: ``report.html`` of a row and of a table, self-contained, and tables in the terminal."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import jinja2
+from rich.console import Console
 
 from vinl.benchmark.metrics import aggregate_episodes
+from vinl.benchmark.table import find_comparison
 from vinl.benchmark.table_config import PaperFigures, TableConfig
 from vinl.chain.failures import FAILURES, read_failure
 from vinl.chain.records import EpisodeRecord, Results
 from vinl.config.loader import load_config
-from vinl.config.output import write_text
 from vinl.config.versions import describe_environment
 from vinl.render.drawing import POINT_DT, draw_histogram, draw_map
+from vinl.render.page import format_number, open_table, render_page
 
 _SHOWN = ("vinl", "vinl_no_clutter", "rough")
 """Rows of the paper's table that every report shows."""
 
+_BY_PLAN = (
+    ("success", "success %", 100, 1),
+    ("spl", "SPL", 1, 3),
+    ("foot_collisions_per_m", "foot collisions per metre", 1, 2),
+)
+"""Figures that the page of a table has for each floor plan: name, title, factor, digits."""
 
-@dataclass(frozen=True)
-class _Row:
+_SUMMARY = (
+    ("success", "success", 100, 1),
+    ("spl", "SPL", 1, 3),
+    ("distance_m", "metres", 1, 2),
+    ("time_s", "s", 1, 1),
+    ("foot_collisions_per_m", "foot/m", 1, 2),
+    ("leg_contacts_per_m", "leg/m", 1, 2),
+)
+"""Figures of a row in the terminal: name, title, factor, digits."""
+
+_FAULTS = (("foot_collisions_per_m", "foot/m"), ("leg_contacts_per_m", "leg/m"), ("speed_rmse", "m/s"))
+
+
+class _Row(NamedTuple):
     """One line of the table of failures or of all episodes."""
 
     number: int
@@ -30,7 +50,7 @@ class _Row:
 
 
 def render_report(results: Results, command: str) -> str:
-    """The page as text.
+    """The page of a row as text.
 
     Args:
         results: what ``evaluate`` returned.
@@ -62,13 +82,9 @@ def render_report(results: Results, command: str) -> str:
         draw_histogram([r.time_s for r in results.records], "time [s]"),
         draw_histogram([r.foot_steps / r.distance_m for r in walked], "foot collisions per metre"),
     ]
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("vinl.render"), autoescape=True, undefined=jinja2.StrictUndefined
-    )
-    environment.filters["figure"] = format_figure
-    environment.filters["failure"] = read_failure
-    environment.filters["published"] = lambda figure: f"{figure[0]:.1f} ± {figure[1]:.1f}"
-    return environment.get_template("report.html.j2").render(
+    return render_page(
+        "report.html.j2",
+        _FILTERS,
         aggregate=results.aggregate,
         plans=plans,
         kinds=FAILURES,
@@ -85,20 +101,135 @@ def render_report(results: Results, command: str) -> str:
     )
 
 
+def render_table_report(data: Mapping[str, Any]) -> str:
+    """The page of a table as text, from what ``summarise_table`` returned."""
+    others = [name for name in data["rows"] if name != data["reference"]]
+    return render_page(
+        "table.html.j2",
+        _FILTERS,
+        data=data,
+        rows=data["rows"],
+        plans=[plan["name"] for plan in data["plans"]],
+        plan_figures=_BY_PLAN,
+        kinds=FAILURES,
+        compared=[(name, *find_comparison(data, name, data["reference"])) for name in others],
+        command=shlex.join(data["command"]),
+        environment=data["environment"],
+    )
+
+
+def print_summary(console: Console, results: Results, out: Path) -> None:
+    """One line a plan, one for all, and where the files lie."""
+    table = open_table("plan", [*[title for _, title, _, _ in _SUMMARY], "falls", "n"])
+    min_metres = results.config["evaluation"]["min_metres"]
+    for plan in results.plans:
+        records = [r for r in results.records if r.plan == plan.name]
+        table.add_row(plan.name, *_summarise(aggregate_episodes(records, min_metres)))
+    table.add_section()
+    table.add_row("all", *_summarise(results.aggregate), style="bold")
+    console.print(table)
+    success, rate = results.aggregate["success"], results.aggregate["foot_collisions_per_m"]
+    console.print(
+        f"success {_format_spread(success, 1, 100)} %, foot collisions {_format_spread(rate, 2)} per metre",
+        soft_wrap=True,
+    )
+    console.print(
+        f"{results.wall_seconds:.0f} s; report {out / 'report.html'}; figures {out / 'results.json'}", soft_wrap=True
+    )
+    for name in results.videos:
+        console.print(f"film {out / name}", soft_wrap=True)
+
+
+def print_table(console: Console, data: Mapping[str, Any], out: Path) -> None:
+    """One line a row: the paper's figures beside ours."""
+    table = open_table("row", ("success %", "f/m", "foot/m", "SPL", "falls %", "n"))
+    for name, row in data["rows"].items():
+        a, paper = row["aggregate"], row["paper"]
+        success, feet = (f" ({paper[key][0]:.1f})" if paper else "" for key in ("success", "foot_collisions_per_m"))
+        table.add_row(
+            name,
+            format_number(a["success"]["mean"], 1, 100) + success,
+            format_number(a["paper_foot_collisions_per_m"]["mean"], 1) + feet,
+            format_number(a["foot_collisions_per_m"]["mean"]),
+            format_number(a["spl"]["mean"], 3),
+            format_number(a["falls"], 1, 100),
+            str(a["episodes"]),
+        )
+    console.print(table)
+    console.print(
+        "in brackets: the paper; f/m: foot collisions per metre by its rule; foot/m: by ours, every physics step"
+    )
+    for name, why in data["left_out"].items():
+        console.print(f"left out: row {name}: {why}", soft_wrap=True)
+    console.print(f"report {out / 'report.html'}; figures {out / 'results.json'}", soft_wrap=True)
+
+
+def print_faults(console: Console, data: Mapping[str, Any]) -> None:
+    """One line a fault."""
+    table = open_table("fault", ("success %", "falls %", *[title for _, title in _FAULTS], "more foot/m", "n"))
+    for name, row in data["rows"].items():
+        a, difference = row["aggregate"], row.get("difference")
+        cells = [format_number(a["success"]["mean"], 1, 100), format_number(a["falls"], 1, 100)]
+        cells += [format_number(a[key]["mean"]) for key, _ in _FAULTS]
+        more = "" if difference is None else format_number(difference["foot_collisions_per_m"]["difference"], sign="+")
+        table.add_row(name, *cells, more, str(a["episodes"]))
+    console.print(table)
+
+
+def format_figure(figure: Mapping[str, Any], digits: int = 2, factor: float = 1.0) -> str:
+    """``mean ± deviation of the seeds``, the mean alone of one seed, or a dash."""
+    spread = figure["std_over_seeds"]
+    mean = format_number(figure["mean"], digits, factor)
+    return mean if spread is None else f"{mean} ± {factor * spread:.{digits}f}"
+
+
+def format_interval(figure: Mapping[str, Any], digits: int = 2, factor: float = 1.0) -> str:
+    """The 95 % interval as ``low to high``, or a dash."""
+    if figure["ci95"] is None:
+        return "-"
+    low, high = figure["ci95"]
+    return f"{factor * low:.{digits}f} to {factor * high:.{digits}f}"
+
+
+def format_published(figure: Any, digits: int = 2) -> str:
+    """Mean and standard deviation as the paper prints them, or nothing."""
+    return "" if not figure else f"{figure[0]:.{digits}f} ± {figure[1]:.{digits}f}"
+
+
+def format_gain(figure: Mapping[str, Any], sign: int, digits: int = 2, factor: float = 1.0) -> str:
+    """``difference (low to high)``, of the row that is wanted first, or a dash."""
+    if figure["difference"] is None:
+        return "-"
+    low, high = sorted(sign * factor * value for value in figure["ci95"])
+    return f"{sign * factor * figure['difference']:+z.{digits}f} ({low:+z.{digits}f} to {high:+z.{digits}f})"
+
+
+_FILTERS = {
+    "figure": format_figure,
+    "interval": format_interval,
+    "failure": read_failure,
+    "published": format_published,
+    "gain": format_gain,
+}
+
+
 def _read_paper() -> list[tuple[str, PaperFigures]]:
     """What the paper found, from the shipped table."""
     rows = load_config(TableConfig, "eval/table").rows
     return [(rows[name].title, paper) for name in _SHOWN if (paper := rows[name].paper) is not None]
 
 
-def write_report(path: Path, results: Results, command: str) -> None:
-    """Write the page, whole or not at all."""
-    write_text(path, render_report(results, command))
+def _summarise(aggregate: Mapping[str, Any]) -> list[str]:
+    cells = [
+        format_number(aggregate[key]["mean"], digits, factor, unit=" %" if factor == 100 else "")
+        for key, _, factor, digits in _SUMMARY
+    ]
+    return [*cells, format_number(aggregate["falls"], 1, 100, unit=" %"), str(aggregate["episodes"])]
 
 
-def format_figure(figure: dict[str, Any], digits: int = 2, factor: float = 1.0) -> str:
-    """``mean ± deviation of the seeds``, the mean alone of one seed, or a dash."""
+def _format_spread(figure: Mapping[str, Any], digits: int, factor: int = 1) -> str:
+    """Mean, spread over seeds and interval."""
     if figure["mean"] is None:
         return "-"
-    spread = figure["std_over_seeds"]
-    return f"{factor * figure['mean']:.{digits}f}" + ("" if spread is None else f" ± {factor * spread:.{digits}f}")
+    spread = "" if figure["std_over_seeds"] is None else " over seeds"
+    return f"{format_figure(figure, digits, factor)}{spread} (95 %: {format_interval(figure, digits, factor)})"

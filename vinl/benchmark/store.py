@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from vinl.benchmark.describe import describe_navigator, describe_plan
+import numpy as np
+
 from vinl.benchmark.journal import Journal, read_wall_seconds
 from vinl.benchmark.metrics import aggregate_episodes
 from vinl.benchmark.protocol import Protocol
 from vinl.benchmark.recordings import forget_recordings, missing_recordings, without_poses, write_recording
 from vinl.benchmark.work import Row, missing_films
+from vinl.chain.navigators.base import ORACLE, Navigator
+from vinl.chain.navigators.learned import LearnedNavigator
+from vinl.chain.navigators.oracle import OracleNavigator
+from vinl.chain.navigators.recovery import RecoveringNavigator
 from vinl.chain.records import Episode, Key, Results
 from vinl.config.versions import list_packages
 from vinl.policies.identity import describe_policy
 from vinl.render.video import name_film
+from vinl.world.floorplan import FloorPlan
 
 
 class Store:
@@ -86,3 +94,25 @@ class Store:
         """Let others write to the folder."""
         if self.journal is not None:
             self.journal.close()
+
+
+def describe_navigator(navigator: Navigator) -> dict[str, Any]:
+    """Which navigator it was: the policy, or the name alone."""
+    if isinstance(navigator, RecoveringNavigator):
+        return {**describe_navigator(navigator.inner), "recovery": True}
+    if isinstance(navigator, LearnedNavigator):
+        return describe_policy(navigator.policy)
+    if isinstance(navigator, OracleNavigator):
+        return {"name": ORACLE}
+    return {"name": getattr(navigator, "name", type(navigator).__name__)}
+
+
+def describe_plan(plan: FloorPlan) -> dict[str, Any]:
+    """Which floor plan it was: walls, furniture and the inside, not where its file lay."""
+    digest = hashlib.sha256()
+    for rows in (plan.walls.rows, plan.furniture.rows):
+        digest.update(np.ascontiguousarray(rows, np.float64).tobytes() + b"|")
+    frame = plan.frame
+    digest.update(repr((frame.x0, frame.y0, frame.resolution, frame.shape)).encode())
+    digest.update(np.packbits(plan.inside).tobytes())
+    return {"name": plan.name, "source": plan.source, "sha256": digest.hexdigest()}

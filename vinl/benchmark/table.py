@@ -7,9 +7,8 @@ from dataclasses import asdict, dataclass
 from itertools import combinations
 from typing import Any
 
-from vinl.benchmark.metrics import aggregate_episodes
-from vinl.benchmark.paired import compare_rows
-from vinl.benchmark.table_config import PaperFigures
+from vinl.benchmark.metrics import aggregate_episodes, compare_rows
+from vinl.benchmark.table_config import IDEAL, PaperFigures
 from vinl.chain.records import Results
 from vinl.config.output import SCHEMA
 from vinl.config.versions import describe_environment
@@ -103,3 +102,25 @@ def find_comparison(data: Mapping[str, Any], one: str, other: str) -> tuple[dict
         if (entry["one"], entry["other"]) == (other, one):
             return entry, -1
     raise KeyError((one, other))
+
+
+def summarise_faults(
+    faults: Mapping[str, Sequence[str]], results: Sequence[Results], command: Sequence[str], min_metres: float
+) -> dict[str, Any]:
+    """What ``results.json`` of the matrix holds: each row's figures, and its differences from the ideal row over the
+    same episodes. The episodes lie in the rows' folders."""
+    rows: dict[str, Any] = {}
+    for (name, settings), one in zip(faults.items(), results, strict=True):
+        rows[name] = {"settings": list(settings), "aggregate": one.aggregate}
+        if name != IDEAL:
+            rows[name]["difference"] = compare_rows(one.records, results[0].records, min_metres)
+    first = results[0]
+    return {
+        "schema": SCHEMA,
+        "command": list(command),
+        "policies": first.policies,
+        "config": first.config,
+        "environment": describe_environment(),
+        "reference": IDEAL,
+        "rows": rows,
+    }

@@ -1,4 +1,4 @@
-"""Which rows a table has: who walks, through what clutter, and what the paper found."""
+"""Which rows a table has: who walks, through what clutter, and what the paper found; or with which fault."""
 
 from __future__ import annotations
 
@@ -7,14 +7,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from vinl.chain.config import EvaluationConfig
 from vinl.chain.navigators.base import ORACLE
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
+from vinl.config.loader import build_config
 from vinl.policies.card import CARD_FILE
 from vinl.policies.io import list_policies
 from vinl.world.clutter import CLUTTER
 
 _NAME = re.compile(r"^[a-z0-9][a-z0-9_-]*$")
+_FAULT = re.compile(r"^[a-z0-9][a-z0-9_.-]*$")
+
+IDEAL = "ideal"
+"""The row of a matrix of faults that has none."""
 
 
 @dataclass(frozen=True)
@@ -117,3 +123,42 @@ class TableConfig:
             if not same:
                 chosen[name] = changed
         return TableConfig(self.reference if self.reference in chosen else next(iter(chosen)), chosen)
+
+
+@dataclass(frozen=True)
+class FaultMatrix:
+    """Which faults are tried.
+
+    Attributes:
+        rows: by name, which is the name of the row's folder; each is settings of an ``EvaluationConfig``, as on the
+            command line.
+
+    Raises:
+        InputError: there is no row, a name is none for a folder, or a row has no settings, or impossible ones.
+    """
+
+    rows: dict[str, tuple[str, ...]]
+
+    def __post_init__(self) -> None:
+        if not self.rows:
+            raise InputError("rows: no fault is named")
+        for name, settings in self.rows.items():
+            if not settings:
+                raise InputError(f"rows.{name}: no setting; give one, such as faults.kp_scale=0.8")
+            build_config(EvaluationConfig, {}, settings, source=f"rows.{name}")
+            if name == IDEAL or not _FAULT.match(name):
+                raise InputError(
+                    f"rows: {name!r} cannot name a fault; take small letters, digits and _.- (ideal is the row without)"
+                )
+
+    def choose(self, names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+        """The rows of these names, or all; the one without faults comes first.
+
+        Raises:
+            InputError: there is no such row.
+        """
+        for name in names:
+            if name not in self.rows and name != IDEAL:
+                known = ", ".join(self.rows)
+                raise InputError(f"--rows: there is no fault {name!r}{closest(name, self.rows)}; known: {known}")
+        return {IDEAL: ()} | {k: v for k, v in self.rows.items() if not names or k in names}

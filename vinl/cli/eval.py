@@ -98,7 +98,7 @@ def main(argv: list[str]) -> int:
     """Run the evaluation and print where its files lie."""
     options = parse_options(Options, settings_first(Options, argv), "eval")
     from vinl.benchmark.evaluate import check_numbers, name_apart
-    from vinl.benchmark.outputs import check_folder
+    from vinl.benchmark.folders import check_folder
     from vinl.benchmark.protocol import Films, Protocol
     from vinl.benchmark.routes import read_routes
     from vinl.chain.choose import best_locomotor
@@ -146,8 +146,8 @@ def main(argv: list[str]) -> int:
 def _run_one(options: Options, out: Path, prepare: Callable[[], Protocol], command: list[str]) -> None:
     from rich.console import Console
 
-    from vinl.benchmark.outputs import write_run
-    from vinl.benchmark.summary import print_summary
+    from vinl.benchmark.folders import write_run
+    from vinl.benchmark.report import print_summary
 
     if options.rows or options.strict:
         raise InputError("--rows and --strict belong to a table; give --table (or --faults, which has rows) too")
@@ -161,8 +161,10 @@ def _run_one(options: Options, out: Path, prepare: Callable[[], Protocol], comma
 def _run_faults(options: Options, out: Path, prepare: Callable[[], Protocol], command: list[str]) -> None:
     from rich.console import Console
 
-    from vinl.benchmark.fault_table import FaultMatrix, print_faults, summarise_faults
-    from vinl.benchmark.outputs import RESULTS_FILE, write_run
+    from vinl.benchmark.folders import RESULTS_FILE, write_run
+    from vinl.benchmark.report import print_faults
+    from vinl.benchmark.table import summarise_faults
+    from vinl.benchmark.table_config import FaultMatrix
     from vinl.config.loader import load_config
     from vinl.config.output import write_json
 
@@ -187,10 +189,10 @@ def _run_faults(options: Options, out: Path, prepare: Callable[[], Protocol], co
 def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], command: list[str]) -> None:
     from rich.console import Console
 
-    from vinl.benchmark.outputs import keep_table, leave_out, write_table
+    from vinl.benchmark.folders import keep_table, leave_out, write_table
+    from vinl.benchmark.report import print_table
     from vinl.benchmark.table import TableRow
     from vinl.benchmark.table_config import TableConfig
-    from vinl.benchmark.table_report import print_table
     from vinl.config.loader import load_config
 
     for name, given in (

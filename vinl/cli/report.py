@@ -29,10 +29,8 @@ def main(argv: list[str]) -> int:
     options = parse_options(Options, argv, "report")
     from rich.console import Console
 
-    from vinl.benchmark.combine import read_folders
-    from vinl.benchmark.outputs import write_run, write_table
-    from vinl.benchmark.summary import print_summary
-    from vinl.benchmark.table_report import print_table
+    from vinl.benchmark.folders import read_folders, write_run, write_table
+    from vinl.benchmark.report import print_summary, print_table
     from vinl.config.output import check_out
 
     out, console = (

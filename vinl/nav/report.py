@@ -7,12 +7,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
 from vinl.chain.metrics import summarise
 from vinl.render.drawing import draw_histogram, keep_low, outline_boxes, outline_path
+from vinl.render.page import open_table, render_page
 from vinl.robot.aliengo import LENGTH
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
@@ -95,8 +94,6 @@ def render_navigation_report(data: dict[str, Any], kinds: Sequence[tuple[Sequenc
     Raises:
         ModuleNotFoundError: jinja2 is not there.
     """
-    import jinja2  # figures without a page can be had without it
-
     parts = []
     for (name, kind), (records, traces) in zip(data["kinds"].items(), kinds, strict=True):
         worst, middle = choose_drawn(records)
@@ -113,19 +110,20 @@ def render_navigation_report(data: dict[str, Any], kinds: Sequence[tuple[Sequenc
         draw_histogram([r.collisions for r in records], "collisions in an episode"),
         draw_histogram([r.geodesic_m for r in records], "geodesic distance [m]"),
     ]
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("vinl.render"), autoescape=True, undefined=jinja2.StrictUndefined
+    return render_page(
+        "nav_report.html.j2",
+        {"interval": format_interval},
+        data=data,
+        parts=parts,
+        histograms=histograms,
+        command=" ".join(data["command"]),
+        environment=data["environment"],
     )
-    environment.filters["interval"] = format_interval
-    return environment.get_template("nav_report.html.j2").render(data=data, parts=parts, histograms=histograms)
 
 
 def print_navigation_summary(console: Console, data: dict[str, Any]) -> None:
     """One row for each kind of home, one for all."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("homes", no_wrap=True)
-    for title in ("success", "95 %", "SPL", "hits", "s", "stuck", "loops", "n"):
-        table.add_column(title, justify="right", no_wrap=True)
+    table = open_table("homes", ("success", "95 %", "SPL", "hits", "s", "stuck", "loops", "n"))
     for name, kind in data["kinds"].items():
         table.add_row(name, *_cells(kind["aggregate"]))
     table.add_section()
