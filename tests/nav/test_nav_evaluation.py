@@ -20,9 +20,8 @@ from vinl.config.paths import assets_dir
 from vinl.nav.config import NavConfig
 from vinl.nav.evaluation import END_REASONS, NavRecord, evaluate_kind
 from vinl.nav.evaluation_setup import NavEvaluation, build_homes, describe_episodes, load_navigator, name_kind
-from vinl.nav.failures import count_failures, print_failures
 from vinl.nav.home_store import HomeStore
-from vinl.nav.report import aggregate_by_distance, choose_drawn
+from vinl.nav.report import aggregate_by_distance, choose_drawn, count_failures, print_failures
 from vinl.nav.training import check_seeds, make_card
 from vinl.nav.warm_start import build_actor
 from vinl.policies.io import save_policy
@@ -114,7 +113,7 @@ def test_it_drives_at_the_speeds_of_the_policys_card(untrained):
 
 def record(success: bool, spl: float, geodesic: float = 6.0) -> NavRecord:
     end = "success" if success else "stuck"
-    return NavRecord("g", "p", 0, 0, (0, 0), (1, 1), 0, 5, geodesic, success, end, 9.0, 7.0, spl, spl, 2, 1.0)
+    return NavRecord("p", 0, 0, (0, 0), (1, 1), 0, 5, geodesic, success, end, 9.0, 7.0, spl, spl, "g", 2, 1.0)
 
 
 def test_classes_of_distance_and_what_is_drawn():

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from vinl.world.heightfield import BLOCK
-from vinl.world.hurdles import draw_bars, draw_hurdles
 from vinl.world.terrain import TILE, TerrainConfig, build_terrain
+from vinl.world.tiles import draw_bars, draw_hurdles
 
 
 @given(st.integers(0, 10**6))

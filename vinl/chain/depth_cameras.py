@@ -10,8 +10,7 @@ from jaxtyping import Float
 
 from vinl.robot.cameras import Camera
 from vinl.robot.rotation import matrix_of
-from vinl.sensing.depth import DepthCamera, Mesh
-from vinl.sensing.prepared import PreparedRender
+from vinl.sensing.depth import DepthCamera, Mesh, PreparedRender
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.mesh import BOTTOM_TRIANGLES, TOP_TRIANGLES, TRIANGLES_PER_BOX, floorplan_mesh

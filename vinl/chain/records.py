@@ -16,8 +16,8 @@ Key = tuple[str, int, int]
 
 
 @dataclass(frozen=True)
-class EpisodeRecord:
-    """One episode, as it stands in ``results.json``. ``*_steps`` count control steps of 0.02 s.
+class RouteRecord:
+    """What every evaluation records of an episode from a start to a goal.
 
     Attributes:
         plan: floor plan.
@@ -26,14 +26,38 @@ class EpisodeRecord:
         start, goal: x, y [m].
         yaw: heading at the start [rad].
         straight_m, geodesic_m: straight and shortest distance from start to goal [m].
-        blocks: how many blocks lay in the plan.
         success: came within the success radius.
         end_reason: one of ``endings.END_REASONS``.
-        fell: ended in a fall.
         time_s: length [s].
-        distance_m: path length of the trunk, summed at 50 Hz [m].
+        distance_m: path length [m].
         spl: success x shortest / max(shortest, walked).
         soft_spl: fraction of the shortest distance that was covered, x the same ratio.
+    """
+
+    plan: str
+    episode: int
+    seed: int
+    start: tuple[float, float]
+    goal: tuple[float, float]
+    yaw: float
+    straight_m: float
+    geodesic_m: float
+    success: bool
+    end_reason: str
+    time_s: float
+    distance_m: float
+    spl: float
+    soft_spl: float
+
+
+@dataclass(frozen=True)
+class EpisodeRecord(RouteRecord):
+    """One episode of the chain, as it stands in ``results.json``. The path is the trunk's, summed at 50 Hz; ``*_steps``
+    count control steps of 0.02 s.
+
+    Attributes:
+        blocks: how many blocks lay in the plan.
+        fell: ended in a fall.
         foot_steps: at least one foot on a block or a wall.
         foot_block_steps, foot_wall_steps: the same for blocks and for walls with furniture.
         leg_contact_steps: a hip, thigh or shank on a block or a wall.
@@ -45,22 +69,8 @@ class EpisodeRecord:
         note: why start and goal are nearer than asked for, if they are.
     """
 
-    plan: str
-    episode: int
-    seed: int
-    start: tuple[float, float]
-    goal: tuple[float, float]
-    yaw: float
-    straight_m: float
-    geodesic_m: float
     blocks: int
-    success: bool
-    end_reason: str
     fell: bool
-    time_s: float
-    distance_m: float
-    spl: float
-    soft_spl: float
     foot_steps: int
     foot_block_steps: int
     foot_wall_steps: int

@@ -71,11 +71,12 @@ def main(argv: list[str]) -> int:
         describe_policy,
         load_navigator,
     )
-    from vinl.nav.failures import count_failures, print_failures
     from vinl.nav.measures import STUCK_STEPS
     from vinl.nav.report import (
         aggregate_by_distance,
         aggregate_navigation,
+        count_failures,
+        print_failures,
         print_navigation_summary,
         render_navigation_report,
     )

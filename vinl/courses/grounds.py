@@ -17,9 +17,9 @@ from vinl.sensing.depth import Mesh
 from vinl.sensing.detour import DetourConfig
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
+from vinl.world.clutter import draw_litter
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, HeightField, flat_field, raise_boxes
-from vinl.world.litter import draw_litter
 from vinl.world.mesh import box_mesh, floor_mesh, heightfield_mesh, join_meshes
 from vinl.world.terrain import TILE, Terrain, TerrainConfig, build_terrain, draw_blocks, scatter_centres
 
@@ -52,7 +52,7 @@ class GroundConfig:
 
     Attributes:
         terrain: ``flat``, ``rough`` (the five types of stage 1), ``blocks``, ``litter`` (small objects, see
-            ``world.litter``) or ``rooms`` (walls close by, and blocks).
+            ``world.clutter``) or ``rooms`` (walls close by, and blocks).
         density: blocks or objects per m2, for ``blocks``, ``litter`` and, on level 9 of them and fewer below, for
             ``rooms``; 0 is no block under the same rules.
         level: level of all robots, for ``rough`` and ``rooms``; spread evenly over levels 1 to 9 if None.

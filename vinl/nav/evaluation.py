@@ -13,6 +13,7 @@ from torch import Tensor
 from vinl.chain.metrics import soft_spl, spl
 from vinl.chain.navigators.base import Task
 from vinl.chain.navigators.oracle import OracleNavigator
+from vinl.chain.records import RouteRecord
 from vinl.nav.config import NavConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.home_store import HomeStore
@@ -31,41 +32,16 @@ _CHECK_EVERY = 25
 
 
 @dataclass(frozen=True)
-class NavRecord:
-    """One episode; names as in ``vinl eval``.
+class NavRecord(RouteRecord):
+    """One episode of the kinematic environment; nothing falls.
 
     Attributes:
         kind: of home: ``generated``, or what the floor plan's file is.
-        plan: name of the home.
-        episode: number within its kind.
-        seed: of the evaluation.
-        start, goal: x, y [m].
-        yaw: heading at the start [rad].
-        straight_m, geodesic_m: straight and shortest distance from start to goal [m].
-        success: came within the success radius.
-        end_reason: one of ``END_REASONS``.
-        time_s: length [s].
-        distance_m: way driven [m].
-        spl, soft_spl: as in ``vinl eval``, see ``vinl.chain.metrics``.
         collisions: steps that were cancelled because the robot would have touched something.
         left_m: shortest distance to the goal at the end [m], by the environment.
     """
 
     kind: str
-    plan: str
-    episode: int
-    seed: int
-    start: tuple[float, float]
-    goal: tuple[float, float]
-    yaw: float
-    straight_m: float
-    geodesic_m: float
-    success: bool
-    end_reason: str
-    time_s: float
-    distance_m: float
-    spl: float
-    soft_spl: float
     collisions: int
     left_m: float
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -15,12 +16,16 @@ from vinl.render.page import open_table, render_page
 from vinl.robot.aliengo import LENGTH
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
+from vinl.world.endings import SUCCESS
 
 DISTANCES = (0.0, 5.0, 7.5, 10.0, 15.0, 20.0, 30.0, float("inf"))
 """Edges of the classes of geodesic distance [m]."""
 
 _WORST, _MIDDLE = 6, 3
 """Episodes drawn of every kind of home."""
+
+_NAMED = 3
+"""Homes named of every kind: those that most episodes were lost in."""
 
 _FIGURES = (("spl", "spl"), ("soft_spl", "soft_spl"), ("collisions", "collisions"), ("distance_m", "distance_m"))
 _MARGIN = 0.4
@@ -152,3 +157,32 @@ def _cells(figures: dict[str, Any]) -> list[str]:
         *(str(ends.get(reason, 0)) for reason in ("stuck", "looping")),
         str(figures["episodes"]),
     ]
+
+
+def count_failures(records: Sequence[Any], reasons: Sequence[str]) -> dict[str, Any]:
+    """Of the episodes of one kind: ``lost``, how many by each of the other ``reasons``, and ``homes`` with their
+    losses, the most first."""
+    lost = [record for record in records if not record.success]
+    homes = Counter(record.plan for record in lost)
+    return {
+        "episodes": len(records),
+        "lost": len(lost),
+        "reasons": {reason: sum(r.end_reason == reason for r in lost) for reason in reasons if reason != SUCCESS},
+        "homes": dict(sorted(homes.items(), key=lambda item: (-item[1], item[0]))),
+    }
+
+
+def print_failures(console: Console, kinds: Mapping[str, Mapping[str, Any]]) -> None:
+    """A row for each kind of home: episodes lost, how, and where most; nothing if none was lost."""
+    if not any(kind["lost"] for kind in kinds.values()):
+        return
+    reasons = list(next(iter(kinds.values()))["reasons"])
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title="failures by kind", title_justify="left")
+    table.add_column("homes", no_wrap=True)
+    for title in ("lost", *reasons):
+        table.add_column(title, justify="right", no_wrap=True)
+    table.add_column("most in")
+    for name, kind in kinds.items():
+        worst = ", ".join(f"{home}: {count}" for home, count in list(kind["homes"].items())[:_NAMED])
+        table.add_row(name, str(kind["lost"]), *(str(kind["reasons"][reason]) for reason in reasons), worst)
+    console.print(table)

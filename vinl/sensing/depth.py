@@ -206,3 +206,57 @@ def _check_shapes(world: Any, position: torch.Tensor, rotation: torch.Tensor) ->
             f"{n} worlds need positions ({n}, 3) and rotations ({n}, 3, 3), "
             f"got {tuple(position.shape)} and {tuple(rotation.shape)}"
         )
+
+
+class PreparedRender:
+    """``DepthCamera.render_poses`` of always n images, into the same place.
+
+    For one image of 64 x 36 pixels, wrapping arrays and checking arguments takes as long as the rays themselves.
+
+    Args:
+        depth: what is looked through; it must be on the CPU, with float32 depth.
+        n: images.
+    """
+
+    def __init__(self, depth: DepthCamera, n: int) -> None:
+        if depth.device.type != "cpu" or depth.dtype != torch.float32:
+            raise ValueError(f"renders float32 on the CPU are prepared, not {depth.dtype} on {depth.device}")
+        self._depth = depth  # its meshes must live as long as the launch
+        camera = depth.camera
+        self._world, self._position = np.zeros(n, np.int32), np.zeros((n, 3), np.float32)
+        self._rotation = np.zeros((n, 3, 3), np.float32)
+        self._tan_half = np.tile(np.array(camera.tan_half, np.float32), (n, 1))
+        self._images = np.zeros((n, camera.height, camera.width), np.float32)
+        self._answer = torch.from_numpy(self._images)
+        self._launch: Any = depth.launch(
+            _share(self._world, wp.int32),
+            _share(self._position, wp.vec3),
+            _share(self._rotation, wp.mat33),
+            _share(self._tan_half, wp.vec2),
+            _share(self._images, wp.float32),
+            record_cmd=True,
+        )
+
+    def __call__(
+        self,
+        world: Sequence[int] | np.ndarray,
+        position: Float[np.ndarray, "n 3"],
+        rotation: Float[np.ndarray, "n 3 3"],
+    ) -> Float[torch.Tensor, "n height width"]:
+        """What cameras see from given poses.
+
+        Args:
+            world: (n,) numbers of meshes; whether there are so many is not checked.
+            position: (n, 3) of the optical centre in the world [m].
+            rotation: (n, 3, 3) camera to world: columns are forward, left and up.
+
+        Returns:
+            Depth [m], overwritten by the next call.
+        """
+        self._world[:], self._position[:], self._rotation[:] = world, position, rotation
+        self._launch.launch()
+        return self._answer
+
+
+def _share(values: np.ndarray, kind: type) -> wp.array:
+    return wp.array(values, dtype=kind, device="cpu", copy=False)

@@ -1,4 +1,4 @@
-"""Clutter: blocks scattered over the free floor of a plan."""
+"""Clutter: blocks scattered over the free floor of a plan; litter, which is small: toys, shoes and books."""
 
 from __future__ import annotations
 
@@ -106,3 +106,23 @@ def _fit(rows: np.ndarray, plan: FloorPlan, obstacles: Any) -> np.ndarray:
     hit, _ = obstacles.query(shapely.polygons(corners), predicate="intersects")
     fits[hit] = False
     return rows[fits]
+
+
+LITTER_SIDE = (0.05, 0.15)
+"""Range of both sides of an object [m]."""
+
+LITTER_HEIGHT = (0.03, 0.10)
+"""Range of its height [m]."""
+
+
+def draw_litter(rng: np.random.Generator, density: float, half: float) -> Blocks:
+    """Objects at random places of the square |x|, |y| <= half, with any yaw; they may lie on one another.
+
+    Args:
+        rng: the only source of chance.
+        density: objects per m2.
+        half: half the side of the square [m].
+    """
+    n = round(density * (2 * half) ** 2)
+    places, yaw = rng.uniform(-half, half, (n, 2)), rng.uniform(0, np.pi, n)
+    return Blocks(np.column_stack([places, yaw, rng.uniform(*LITTER_SIDE, (n, 2)), rng.uniform(*LITTER_HEIGHT, n)]))

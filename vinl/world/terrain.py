@@ -14,8 +14,7 @@ from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
-from vinl.world.hurdles import draw_bars, draw_hurdles
-from vinl.world.rooms_tile import draw_rooms
+from vinl.world.tiles import draw_bars, draw_hurdles, draw_rooms
 
 RESOLUTION = 0.05
 """Pitch of the height field [m]."""

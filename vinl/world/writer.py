@@ -11,7 +11,7 @@ from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import FloorPlan
 from vinl.world.raster import split_rectangles
-from vinl.world.readers.boxes_plan import SCHEMA
+from vinl.world.readers.own import BOXES_SCHEMA
 
 
 def write_floorplan(plan: FloorPlan, file: str | Path) -> Path:
@@ -39,7 +39,7 @@ def write_floorplan(plan: FloorPlan, file: str | Path) -> Path:
         "windows": _list(plan.windows),
         "labels": [{"name": label.name, "at": [label.x, label.y]} for label in plan.labels],
     }
-    parts = [f'  "schema": "{SCHEMA}"', f'  "name": {json.dumps(plan.name)}', f'  "grid": {json.dumps(grid)}']
+    parts = [f'  "schema": "{BOXES_SCHEMA}"', f'  "name": {json.dumps(plan.name)}', f'  "grid": {json.dumps(grid)}']
     for key, entries in lists.items():
         lines = ",\n".join("    " + json.dumps(entry) for entry in entries)
         parts.append(f'  "{key}": [\n{lines}\n  ]' if entries else f'  "{key}": []')

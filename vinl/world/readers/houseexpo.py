@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from vinl.config.errors import InputError
 from vinl.world.boxes import FARTHEST, Boxes
 from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan, frame_around
 from vinl.world.readers.polygons import paint_polygon
+from vinl.world.readers.segments import box_along
 
 WALL_THICKNESS = 0.08
 """Walls stand on the outline, this thick [m]. Between rooms the outline runs along both faces of the real wall."""
@@ -63,7 +65,9 @@ def build_houseexpo_plan(
         raise InputError(f"{source}: the outline crosses itself at ({x:.2f}, {y:.2f}); the order of 'verts' is wrong")
     frame = frame_around(low, high, source)
     inside = paint_polygon(points, frame)
-    walls = Boxes(np.array([_raise(a, b, wall_height) for a, b in zip(points, np.roll(points, -1, 0), strict=True)]))
+    sides = pairwise([(float(x), float(y)) for x, y in (*points, points[0])])
+    # half a thickness beyond both ends fills the corners
+    walls = Boxes(np.array([box_along(a, b, WALL_THICKNESS, 0.0, wall_height, WALL_THICKNESS / 2) for a, b in sides]))
     return assemble_floorplan(
         str(entries.get("id", name)), source, walls, Boxes.empty(), inside, frame, labels=_name(entries, scale or 1.0)
     )
@@ -72,30 +76,14 @@ def build_houseexpo_plan(
 def find_crossing(points: Float[np.ndarray, "k 2"]) -> tuple[float, float] | None:
     """Where two edges of a closed outline cross, if any do. Edges that only touch are let be: walls without
     thickness."""
-    a, b = points, np.roll(points, -1, axis=0)
-    edge = b - a
+    import shapely  # only here: generated homes do without
 
-    def side(p: np.ndarray) -> np.ndarray:  # of point j relative to edge i [m]
-        d = p[None] - a[:, None]
-        return (edge[:, None, 0] * d[..., 1] - edge[:, None, 1] * d[..., 0]) / np.linalg.norm(edge, axis=1)[:, None]
-
-    start, end = side(a), side(b)
-    apart = (np.minimum(start, end) < -1e-6) & (np.maximum(start, end) > 1e-6)
-    pairs = np.argwhere(np.triu(apart & apart.T))
-    if not len(pairs):
-        return None
-    i, j = pairs[0]
-    share = start[i, j] / (start[i, j] - end[i, j])
-    x, y = a[j] + share * edge[j]
-    return float(x), float(y)
-
-
-def _raise(a: np.ndarray, b: np.ndarray, height: float) -> list[float]:
-    middle, along = (a + b) / 2, b - a
-    # half a thickness beyond both ends fills the corners
-    length = float(np.linalg.norm(along)) + WALL_THICKNESS
-    yaw = float(np.arctan2(along[1], along[0]))
-    return [float(middle[0]), float(middle[1]), yaw, length, WALL_THICKNESS, 0.0, height]
+    edges = [shapely.LineString(pair) for pair in np.stack([points, np.roll(points, -1, axis=0)], 1)]
+    for i, j in shapely.STRtree(edges).query(edges, predicate="crosses").T:
+        at = edges[i].intersection(edges[j]).centroid
+        if min(at.distance(shapely.Point(end)) for k in (i, j) for end in edges[k].coords) > 1e-6:
+            return at.x, at.y
+    return None
 
 
 def _check_box(box: Any, size: np.ndarray, source: str) -> None:

@@ -11,10 +11,8 @@ from typing import Any
 
 from vinl.config.errors import InputError
 from vinl.world.floorplan import FloorPlan
-from vinl.world.readers.boxes_plan import SCHEMA as BOXES_SCHEMA
-from vinl.world.readers.boxes_plan import build_boxes_plan
 from vinl.world.readers.houseexpo import build_houseexpo_plan, is_houseexpo
-from vinl.world.readers.own import SCHEMA, build_own_plan
+from vinl.world.readers.own import BOXES_SCHEMA, SCHEMA, build_boxes_plan, build_own_plan
 from vinl.world.readers.procthor import build_procthor_plan
 from vinl.world.readers.vectors import build_vector_plan, is_vector_plan
 from vinl.world.start_goal import check_way

@@ -1,4 +1,5 @@
-"""This package's own floor-plan format: a JSON object that a person can write. Described in docs/floorplans.md."""
+"""This package's own floor-plan formats: one that a person can write, one that it writes itself. Both are described in
+docs/floorplans.md."""
 
 from __future__ import annotations
 
@@ -8,12 +9,16 @@ import numpy as np
 
 from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
-from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan
+from vinl.world.floorplan import MAX_CELLS, FloorPlan, RoomLabel, assemble_floorplan
+from vinl.world.grid import GridFrame
 from vinl.world.readers.polygons import paint_inside, place_label
-from vinl.world.readers.segments import Opening, Wall, raise_walls
+from vinl.world.readers.segments import Opening, Wall, box_along, raise_walls
 
 SCHEMA = "vinl/floorplan/1"
-"""What the entry ``schema`` of such a file says."""
+"""What the entry ``schema`` of a file that a person wrote says."""
+
+BOXES_SCHEMA = "vinl/floorplan-boxes/1"
+"""And of one that this package wrote: boxes, and the cells inside."""
 
 
 def build_own_plan(entries: dict[str, Any], name: str, source: str) -> FloorPlan:
@@ -36,7 +41,10 @@ def build_own_plan(entries: dict[str, Any], name: str, source: str) -> FloorPlan
         for room, polygon in zip(entries["rooms"], polygons, strict=True)
     )
     furniture = Boxes(np.array([_read_thing(thing) for thing in entries.get("furniture", [])]).reshape(-1, 7))
-    windows = [_read_pane(pane) for pane in entries.get("windows", [])]
+    windows = [
+        box_along(_point(pane["from"]), _point(pane["to"]), 0.08, *(float(v) for v in pane["span"]))
+        for pane in entries.get("windows", [])
+    ]
     return assemble_floorplan(
         str(entries.get("name", name)),
         source,
@@ -60,7 +68,35 @@ def _read_thing(thing: dict[str, Any]) -> list[float]:
     return [float(v) for v in (x, y, np.deg2rad(thing.get("turn", 0.0)), length, width, bottom, top)]
 
 
-def _read_pane(pane: dict[str, Any]) -> list[float]:
-    (x0, y0), (x1, y1) = _point(pane["from"]), _point(pane["to"])
-    yaw, length = np.arctan2(y1 - y0, x1 - x0), np.hypot(x1 - x0, y1 - y0)
-    return [(x0 + x1) / 2, (y0 + y1) / 2, float(yaw), float(length), 0.08, *(float(v) for v in pane["span"])]
+def build_boxes_plan(entries: dict[str, Any], name: str, source: str) -> FloorPlan:
+    """Build a floor plan from what ``write_floorplan`` wrote.
+
+    Raises:
+        InputError: if a box or the grid makes no sense, or there is no floor for the robot.
+    """
+    grid = entries["grid"]
+    frame = GridFrame(
+        float(grid["x0"]), float(grid["y0"]), float(grid["resolution"]), (int(grid["rows"]), int(grid["columns"]))
+    )
+    rows, columns = frame.shape
+    if not np.isfinite([frame.x0, frame.y0]).all() or not 0.002 <= frame.resolution <= 2.0:
+        raise InputError(f"{source}: the grid needs a finite origin and a resolution between 0.002 m and 2 m")
+    if min(rows, columns) < 1 or rows * columns > MAX_CELLS:
+        raise InputError(f"{source}: the grid has {rows} x {columns} cells; between 1 and {MAX_CELLS} are possible")
+    inside = np.zeros(frame.shape, dtype=bool)
+    x, y = frame.centres()
+    for x0, y0, x1, y1 in np.array(entries["inside"], dtype=float).reshape(-1, 4):
+        columns_in, rows_in = np.searchsorted(x, [x0, x1]), np.searchsorted(y, [y0, y1])
+        inside[slice(*rows_in), slice(*columns_in)] = True
+    walls, furniture, windows = (_read_boxes(entries.get(key, [])) for key in ("walls", "furniture", "windows"))
+    labels = tuple(
+        RoomLabel(str(label["name"]), *(float(v) for v in label["at"])) for label in entries.get("labels", [])
+    )
+    return assemble_floorplan(str(entries.get("name", name)), source, walls, furniture, inside, frame, windows, labels)
+
+
+def _read_boxes(rows: list[Any]) -> Boxes:
+    table = np.array(rows, dtype=float)
+    if rows and (table.ndim != 2 or table.shape[1] != 7):
+        raise InputError("a box needs 7 numbers: x, y, yaw, length, width, bottom, top")
+    return Boxes(table) if rows else Boxes.empty()

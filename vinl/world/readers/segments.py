@@ -8,6 +8,8 @@ import numpy as np
 
 from vinl.world.boxes import Boxes
 
+Point = tuple[float, float]
+
 ON_LINE = 0.05
 """Two walls on parallel lines nearer than this [m] are one wall seen from its two sides."""
 
@@ -16,8 +18,8 @@ ON_LINE = 0.05
 class Wall:
     """A straight wall. Ends and thickness in metres, ``height`` above the floor."""
 
-    start: tuple[float, float]
-    end: tuple[float, float]
+    start: Point
+    end: Point
     thickness: float
     height: float
 
@@ -26,9 +28,18 @@ class Wall:
 class Opening:
     """A doorway: a stretch of a wall's middle line that is open from the floor up to ``height`` [m]."""
 
-    start: tuple[float, float]
-    end: tuple[float, float]
+    start: Point
+    end: Point
     height: float
+
+
+def box_along(
+    start: Point, end: Point, thickness: float, bottom: float, top: float, beyond: float = 0.0
+) -> list[float]:
+    """A row of ``Boxes`` along a line [m], which goes on ``beyond`` both ends."""
+    (x0, y0), (x1, y1) = start, end
+    yaw, length = np.arctan2(y1 - y0, x1 - x0), np.hypot(x1 - x0, y1 - y0) + 2 * beyond
+    return [float(v) for v in ((x0 + x1) / 2, (y0 + y1) / 2, yaw, length, thickness, bottom, top)]
 
 
 def raise_walls(walls: list[Wall], openings: list[Opening]) -> np.ndarray:

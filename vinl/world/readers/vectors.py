@@ -12,7 +12,7 @@ from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan, frame
 from vinl.world.grid import GridFrame
 from vinl.world.raster import label_regions, paint_boxes
 from vinl.world.readers.enclosure import find_inside
-from vinl.world.readers.segments import Opening, Wall, raise_walls
+from vinl.world.readers.segments import Opening, Wall, box_along, raise_walls
 
 WALL_THICKNESS = 0.12
 """The file's walls are lines; here they are this thick [m]."""
@@ -73,7 +73,9 @@ def build_vector_plan(
     openings = [_open(door) for door in doors if _leads_inside(door, inside & storey, frame)]
     boxes = Boxes(raise_walls(walls, openings))
     if openings:  # the floor of a doorway belongs to the inside
-        inside |= paint_boxes(Boxes(np.array([_doorway(opening) for opening in openings])), frame)
+        inside |= paint_boxes(
+            Boxes(np.array([box_along(o.start, o.end, WALL_THICKNESS + 0.1, 0.0, 1.0) for o in openings])), frame
+        )
     kept = _touch(boxes, storey, frame)
     icons = [entry for entry in entries.get("icons", []) if entry[4] in TOPS]
     places = _to_metres([entry[:4] for entry in icons], scale)
@@ -134,12 +136,6 @@ def _leads_inside(door: np.ndarray, inside: np.ndarray, frame: GridFrame) -> boo
     middle = start + (end - start) * np.linspace(0.2, 0.8, 7)[:, None]
     cells = frame.cell(np.stack([middle + across * BESIDE, middle - across * BESIDE]))
     return bool((inside[cells[..., 0], cells[..., 1]].mean(1) > 0.5).all())
-
-
-def _doorway(opening: Opening) -> list[float]:
-    (x0, y0), (x1, y1) = opening.start, opening.end
-    yaw, length = np.arctan2(y1 - y0, x1 - x0), np.hypot(x1 - x0, y1 - y0)
-    return [(x0 + x1) / 2, (y0 + y1) / 2, float(yaw), float(length), WALL_THICKNESS + 0.1, 0.0, 1.0]
 
 
 def _stand(place: np.ndarray, top: float) -> list[float]:
