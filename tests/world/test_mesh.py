@@ -1,14 +1,18 @@
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
+from vinl.world.floorplan import FloorPlan
 from vinl.world.grid import GridFrame
 from vinl.world.mesh import box_mesh, floor_mesh, floorplan_mesh, heightfield_mesh
 
 trimesh = pytest.importorskip("trimesh")
+
+
+def plan_of(walls: Boxes, frame: GridFrame) -> FloorPlan:
+    floor = np.ones(frame.shape, bool)
+    return FloorPlan("plan", "plan", walls, Boxes.empty(), floor, floor, frame)
 
 
 def normals(vertices, faces):
@@ -38,7 +42,7 @@ def test_corners_agree_with_the_boxes():
 
 def test_plan_mesh_has_floor_blocks_and_ceiling():
     frame = GridFrame(0.025, 0.025, 0.05, (40, 60))
-    plan = SimpleNamespace(boxes=Boxes(np.array([[1, 1, 0, 1, 0.1, 0, 2.5]])), frame=frame)
+    plan = plan_of(Boxes(np.array([[1, 1, 0, 1, 0.1, 0, 2.5]])), frame)
     blocks = Blocks(np.array([[2, 1, 0.4, 0.3, 0.2, 0.15]]))
     vertices, faces = floorplan_mesh(plan, blocks, ceiling=2.6)
     assert len(faces) == 12 + 12 + 2 + 2
@@ -50,7 +54,7 @@ def test_plan_mesh_has_floor_blocks_and_ceiling():
 
 
 def test_empty_plan_is_only_floor():
-    plan = SimpleNamespace(boxes=Boxes.empty(), frame=GridFrame(0.0, 0.0, 0.1, (5, 5)))
+    plan = plan_of(Boxes.empty(), GridFrame(0.0, 0.0, 0.1, (5, 5)))
     vertices, faces = floorplan_mesh(plan)
     assert (vertices == floor_mesh(plan.frame)[0]).all() and len(faces) == 2
 

@@ -13,7 +13,7 @@ from vinl.robot.rotation import matrix_of
 from vinl.sensing.depth import DepthCamera, Mesh, PreparedRender
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import FloorPlan
-from vinl.world.mesh import BOTTOM_TRIANGLES, TOP_TRIANGLES, TRIANGLES_PER_BOX, floorplan_mesh
+from vinl.world.mesh import floor_mesh, join_meshes, seen_box_mesh
 
 _ON_FLOOR, _OVER_CAMERA = 0.01, 1.2
 """A box lower than this stands on the floor; the cameras of a robot of 0.5 m stay below this [m]."""
@@ -111,10 +111,5 @@ def seen_mesh(plan: FloorPlan, blocks: Blocks, ceiling: float | None = None) -> 
     Left out: bottoms that lie on the floor, and tops that are higher than any camera gets. Fewer triangles make quicker
     rays.
     """
-    vertices, faces = floorplan_mesh(plan, blocks, ceiling)
-    boxes = plan.boxes + blocks.boxes()
-    shown = np.ones((len(boxes), TRIANGLES_PER_BOX), bool)
-    shown[:, BOTTOM_TRIANGLES] = (boxes.rows[:, 5] >= _ON_FLOOR)[:, None]
-    shown[:, TOP_TRIANGLES] = (boxes.rows[:, 6] <= _OVER_CAMERA)[:, None]
-    rest = faces[shown.size :]  # the floor, then the ceiling
-    return vertices, np.concatenate([faces[: shown.size][shown.ravel()], rest[_FLOOR_TRIANGLES:]])
+    home = seen_box_mesh(plan.boxes + blocks.boxes(), _OVER_CAMERA)
+    return home if ceiling is None else join_meshes(home, floor_mesh(plan.frame, ceiling, up=False))

@@ -224,18 +224,7 @@ class NavEnvironment:
         reward = rules.progress * (before - state["distance"]) + rules.success * success
         reward += rules.slack + rules.collision * self._blocked
         reward = rules.scale * reward
-        self.ended = end_episodes(
-            done,
-            state["home"],
-            success,
-            state["collisions"],
-            state["in_a_row"],
-            state["steps"],
-            state["path"],
-            state["start_distance"],
-            state["distance"],
-            episodes.success_radius,
-        )
+        self.ended = end_episodes(state, done, success)
         self._measures.add(self.ended, reward, self._blocked, self._moved)
         self._observation = None
         return reward, done, timeout

@@ -10,18 +10,17 @@ from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
-from scipy.ndimage import label
 
 from vinl.config.errors import InputError
 from vinl.nav.config import ClutterConfig, NavConfig
 from vinl.nav.fields import measure_near_clearance, spread_fields
-from vinl.nav.robot_config import NavCameraConfig
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import RESOLUTION, FloorPlan
 from vinl.world.grid import GridFrame
 from vinl.world.homes.config import layout_config
-from vinl.world.mesh import BOTTOM_TRIANGLES, TOP_TRIANGLES, TRIANGLES_PER_BOX, box_mesh
+from vinl.world.mesh import seen_box_mesh
+from vinl.world.raster import find_largest, label_regions
 
 FINE = 2
 """Cells of the clearance grid along a side of a cell of the distance fields."""
@@ -168,8 +167,8 @@ def prepare_home(plan: FloorPlan, seed: int, config: NavConfig) -> BuiltHome | s
     rng = np.random.default_rng([seed, 68279])
     homes = config.homes
     fine = measure_near_clearance(plan.free, RESOLUTION, REACH)
-    region = _largest_region(fine[::FINE, ::FINE] >= homes.path_radius)
-    if region is None:
+    region = find_largest(label_regions(fine[::FINE, ::FINE] >= homes.path_radius))
+    if not region.any():
         return f"{plan.name}: the robot fits nowhere"
     fine, region, first = _crop(fine, region)
     coarse = fine[::FINE, ::FINE]
@@ -189,7 +188,8 @@ def prepare_home(plan: FloorPlan, seed: int, config: NavConfig) -> BuiltHome | s
     if not len(boxes):
         return f"{plan.name}: there are no walls"
     blocks = _draw_blocks(plan, rng, config.clutter)
-    vertices, faces = _draw_mesh(boxes + blocks.boxes(), config.camera)
+    highest = (0.0 if config.camera is None else config.camera.mount_height) + _OVER_CAMERA
+    vertices, faces = seen_box_mesh(boxes + blocks.boxes(), highest)
     x0, y0 = plan.frame.xy(first)
     to_xy = np.array([x0, y0])
     return BuiltHome(
@@ -207,28 +207,6 @@ def prepare_home(plan: FloorPlan, seed: int, config: NavConfig) -> BuiltHome | s
         vertices=vertices,
         faces=faces,
     )
-
-
-def _draw_mesh(boxes: Boxes, camera: NavCameraConfig | None) -> tuple[np.ndarray, np.ndarray]:
-    """The boxes without the faces that the camera never sees: bottoms on the floor, tops far above it. Fewer triangles
-    make quicker rays."""
-    vertices, faces = box_mesh(boxes)
-    over = (camera.mount_height if camera is not None else 0.0) + _OVER_CAMERA
-    bottom, top = boxes.rows[:, 5], boxes.rows[:, 6]
-    seen = np.ones((len(boxes), TRIANGLES_PER_BOX), bool)
-    seen[:, BOTTOM_TRIANGLES] = (bottom >= 0.01)[:, None]
-    seen[:, TOP_TRIANGLES] = (top <= over)[:, None]
-    return vertices, np.ascontiguousarray(faces[seen.ravel()])
-
-
-def _largest_region(traversable: np.ndarray) -> np.ndarray | None:
-    """The largest part that hangs together over the cells' edges."""
-    regions, count = label(traversable)  # type: ignore[misc]
-    if count == 0:
-        return None
-    sizes = np.bincount(regions.ravel())
-    sizes[0] = 0
-    return regions == sizes.argmax()
 
 
 def _crop(fine: np.ndarray, region: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import torch
@@ -12,21 +13,6 @@ from vinl.world.endings import LOOPING_WAYS
 
 STUCK_STEPS = 10
 """An episode that runs out of time after at least so many cancelled steps in a row counts as stuck."""
-
-_NAMES = (
-    "episodes",
-    "success",
-    "spl",
-    "soft_spl",
-    "collisions",
-    "steps",
-    "path",
-    "start_distance",
-    "end_distance",
-    "stuck",
-    "looping",
-    "out_of_time",
-)
 
 
 class EpisodeEnd(NamedTuple):
@@ -60,37 +46,27 @@ class EpisodeEnd(NamedTuple):
     out_of_time: Float[Tensor, " n"]
 
 
-def end_episodes(
-    counted: Tensor,
-    home: Tensor,
-    success: Tensor,
-    collisions: Tensor,
-    in_a_row: Tensor,
-    steps: Tensor,
-    path: Tensor,
-    start: Tensor,
-    end: Tensor,
-    radius: float,
-) -> EpisodeEnd:
-    """The figures of episodes, all (n,); ``radius`` [m] is that of success.
+def end_episodes(state: Mapping[str, Tensor], counted: Bool[Tensor, " n"], success: Bool[Tensor, " n"]) -> EpisodeEnd:
+    """The figures of the episodes of robots in a state, see ``NavEnvironment``.
 
-    The way starts ``start`` metres from the goal and may end ``radius`` before it; SPL compares with ``start``, as
-    habitat does, so that the last ``radius`` metres are given to the robot.
+    SPL compares with the distance at the start, as habitat does, so that the last metres, within the radius of success,
+    are given to the robot.
     """
+    start, path, end = state["start_distance"], state["path"], state["distance"]
     reached = success.float()
     efficiency = start / torch.maximum(path, start)
     progress = (1.0 - end / start).clamp(0.0, 1.0)
     late = 1.0 - reached
-    stuck = late * (in_a_row >= STUCK_STEPS)
+    stuck = late * (state["in_a_row"] >= STUCK_STEPS)
     looping = late * (1.0 - stuck) * (path > LOOPING_WAYS * start)
     return EpisodeEnd(
         counted=counted,
-        home=home.clone(),
+        home=state["home"].clone(),
         success=reached,
         spl=reached * efficiency,
         soft_spl=torch.where(success, 1.0, progress) * efficiency,
-        collisions=collisions.clone(),
-        steps=steps.clone(),
+        collisions=state["collisions"].clone(),
+        steps=state["steps"].clone(),
         path=path.clone(),
         start_distance=start.clone(),
         end_distance=end.clone(),
@@ -98,6 +74,9 @@ def end_episodes(
         looping=looping,
         out_of_time=late - stuck - looping,
     )
+
+
+_NAMES = ("episodes", *EpisodeEnd._fields[2:])
 
 
 class Measures:

@@ -177,10 +177,7 @@ def print_failures(console: Console, kinds: Mapping[str, Mapping[str, Any]]) -> 
     if not any(kind["lost"] for kind in kinds.values()):
         return
     reasons = list(next(iter(kinds.values()))["reasons"])
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, title="failures by kind", title_justify="left")
-    table.add_column("homes", no_wrap=True)
-    for title in ("lost", *reasons):
-        table.add_column(title, justify="right", no_wrap=True)
+    table = open_table("homes", ("lost", *reasons), title="failures by kind", title_justify="left")
     table.add_column("most in")
     for name, kind in kinds.items():
         worst = ", ".join(f"{home}: {count}" for home, count in list(kind["homes"].items())[:_NAMED])

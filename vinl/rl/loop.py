@@ -49,6 +49,7 @@ class TrainingEnv(Protocol):
         ...
 
 
+@runtime_checkable
 class Algorithm(Protocol):
     """A learner with the names of rsl-rl's algorithms.
 
@@ -114,7 +115,7 @@ class TrainingLoop:
     def __init__(
         self,
         env: Any,
-        algorithm: Any,
+        algorithm: Algorithm,
         steps: int,
         folder: RunFolder,
         device: str,

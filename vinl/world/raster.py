@@ -22,6 +22,13 @@ def label_regions(mask: Bool[np.ndarray, "rows columns"], corners: bool = False)
     return regions
 
 
+def find_largest(regions: Int[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "rows columns"]:
+    """The cells of the region with most of them; none where there is none."""
+    sizes = np.bincount(regions.ravel())
+    sizes[0] = 0
+    return (regions == sizes.argmax()) & (regions > 0)
+
+
 def split_rectangles(mask: Bool[np.ndarray, "rows columns"], limit: int = 20_000) -> Int[np.ndarray, "n 4"]:
     """Few rectangles that together cover exactly the true cells of the mask.
 

@@ -12,12 +12,10 @@ from scipy import ndimage
 from vinl.config.errors import InputError
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
+from vinl.world.floorplan import RESOLUTION
 from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
 from vinl.world.tiles import draw_bars, draw_hurdles, draw_rooms
-
-RESOLUTION = 0.05
-"""Pitch of the height field [m]."""
 
 TILE = 8.0
 """Side of a tile [m] [ViNL config]."""
