@@ -14,8 +14,8 @@ import os
 from dataclasses import asdict
 from pathlib import Path
 
-from vinl.courses.motion_fit import Execution, Sway, describe_sway, fit_execution
-from vinl.courses.trunk_motion import record_motion
+from trunk_motion import Execution, Sway, describe_sway, fit_execution, record_motion
+
 from vinl.policies.io import load_policy
 from vinl.world.clutter import CLUTTER
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.delay_line import DelayLine
 from vinl.chain.episode import draw_routes, draw_setup
 from vinl.chain.fault_config import FaultConfig
 from vinl.chain.faults import FaultyState, change_body
 from vinl.chain.navigators.choose import load_navigator
+from vinl.chain.robot import DelayLine
 from vinl.chain.rollout import run_episodes
 from vinl.chain.scene import build_scene
 from vinl.config.errors import InputError
@@ -61,10 +61,10 @@ def test_neutral_faults_walk_the_same_to_the_last_bit_and_others_do_not(
 def test_targets_are_late_by_physics_steps():
     targets = [np.full(12, float(k)) for k in range(4)]
     for late, expected in ((0, [0, 0, 0, 0, 1, 1, 1, 1]), (1, [9, 0, 0, 0, 0, 1, 1, 1]), (6, [9] * 6 + [0, 0])):
-        line = DelayLine(late, np.full(12, 9.0), 4)
+        line = DelayLine(late, np.full(12, 9.0))
         sent = [float(t[0]) for target in targets[:2] for t in line.push(target)]
         assert sent == expected, late
-    line = DelayLine(8, DEFAULT_POSE, 4)
+    line = DelayLine(8, DEFAULT_POSE)
     assert [float(line.push(target)[0][0]) for target in targets] == [0.1, 0.1, 0.0, 1.0]
 
 

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from vinl.chain.controller import open_controller
-from vinl.courses.evaluate import evaluate_locomotor
+from vinl.courses.evaluate import compare_locomotors
 from vinl.gait.config import GaitConfig
 from vinl.gait.observation import SENSED_TABLE, STEPPING_TABLE
 from vinl.policies.card import locomotion_card
@@ -81,5 +81,5 @@ def test_a_policy_without_the_trunks_velocity_is_not_given_it(room: FloorPlan) -
 
 
 def test_it_walks_on_the_courses_and_workers_change_nothing() -> None:
-    results = [evaluate_locomotor(teacher(), "blocks", robots=2, seconds=0.4, workers=w) for w in (1, 2)]
+    results = [compare_locomotors([teacher()], "blocks", robots=2, seconds=0.4, workers=w)[0] for w in (1, 2)]
     assert results[0].aggregate == results[1].aggregate

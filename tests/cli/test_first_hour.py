@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 from vinl.cli.app import COMMANDS, main
-from vinl.cli.places import default_out
+from vinl.cli.options import default_out
 from vinl.config.errors import InputError
 from vinl.rl.out_of_memory import explain_out_of_memory
 from vinl.rl.progress import TrainingProgress

@@ -32,8 +32,8 @@ def test_students_walk_beside_others(vision: str, trotting: LocomotionPolicy) ->
         network, PolicyCard("locomotion", vision, network.describe(), PROPRIOCEPTION.describe(), action, camera)
     )
     results = compare_locomotors([student, trotting], "blocks", 2, 0.4)
-    assert [len(r.robots) for r in results] == [2, 2]
-    assert results[0].robots[0].steps == 20
+    assert [len(r.records) for r in results] == [2, 2]
+    assert results[0].records[0].steps == 20
 
 
 def test_camera_sees_the_blocks_that_the_feet_meet() -> None:

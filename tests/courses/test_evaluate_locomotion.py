@@ -6,7 +6,7 @@ import pytest
 from vinl.chain.scene import build_scene
 from vinl.courses.block_contacts import BINS
 from vinl.courses.courses import COMMANDS, FIXED, Course, Start, choose_commands, command_ranges, draw_commands
-from vinl.courses.evaluate import compare_locomotors, evaluate_locomotor
+from vinl.courses.evaluate import compare_locomotors
 from vinl.courses.grounds import GroundConfig, build_ground
 from vinl.courses.herd import BoxHerd
 from vinl.courses.robot_records import RobotRecord, aggregate_robots
@@ -17,13 +17,13 @@ from vinl.world.boxes import Boxes
 
 
 def test_same_numbers_from_two_processes(trotting: LocomotionPolicy) -> None:
-    runs = [evaluate_locomotor(trotting, "blocks", 18, 0.6, workers=w) for w in (1, 2)]
-    assert runs[0].robots == runs[1].robots
-    assert [r.robot for r in runs[0].robots] == list(range(18))
+    runs = [compare_locomotors([trotting], "blocks", 18, 0.6, workers=w)[0] for w in (1, 2)]
+    assert runs[0].records == runs[1].records
+    assert [r.robot for r in runs[0].records] == list(range(18))
 
 
 def test_names_that_others_read(standing: LocomotionPolicy) -> None:
-    figures = evaluate_locomotor(standing, "flat", 2, 0.5).aggregate
+    figures = compare_locomotors([standing], "flat", 2, 0.5)[0].aggregate
     assert figures["falls"] == 0
     assert {"linear_velocity_rmse", "yaw_rate_rmse", "foot_block_per_m", "leg_block_per_m", "metres"} <= figures.keys()
     assert figures["mean_level"] is None
@@ -49,7 +49,7 @@ def test_in_rooms_walls_stand_close_to_every_start_and_cameras_see_them(standing
     assert len(ground.mesh()[1]) > 12 * len(ground.walls)
     assert choose_commands(None, "rooms") == "navigator"
     assert 0 < (ground.covered() or 0) < 0.1 and bare.covered() is None
-    figures = evaluate_locomotor(standing, "rooms", 2, 0.5).aggregate
+    figures = compare_locomotors([standing], "rooms", 2, 0.5)[0].aggregate
     assert figures["falls"] == 0 and figures["mean_level"] is not None
 
 
@@ -84,9 +84,9 @@ def test_commands_of_every_name_stay_in_their_ranges(standing: LocomotionPolicy)
 
 
 def test_all_policies_meet_the_same_courses(standing: LocomotionPolicy, trotting: LocomotionPolicy) -> None:
-    alone = evaluate_locomotor(trotting, "blocks", 3, 0.5)
+    alone = compare_locomotors([trotting], "blocks", 3, 0.5)[0]
     together = compare_locomotors([standing, trotting], "blocks", 3, 0.5)
-    assert together[1].robots == alone.robots
+    assert together[1].records == alone.records
     assert together[0].config == together[1].config
     ground = build_ground(GroundConfig("blocks", 1.0, None, 0, 40.0, 2.0))
     bare = build_ground(GroundConfig("blocks", 0.0, None, 0, 40.0, 2.0))
@@ -144,4 +144,4 @@ def test_figures_of_known_records() -> None:
 )
 def test_bad_options(standing: LocomotionPolicy, options: dict, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        evaluate_locomotor(standing, **options)
+        compare_locomotors([standing], **options)

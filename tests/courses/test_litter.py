@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vinl.courses.courses import FIXED, FOOT_CLEARANCE, Course
-from vinl.courses.evaluate import evaluate_locomotor
+from vinl.courses.evaluate import compare_locomotors
 from vinl.courses.grounds import LITTER_FIELD, GroundConfig, build_ground
 from vinl.courses.herd import BoxHerd
 from vinl.courses.trial import run_trial
@@ -70,7 +70,7 @@ def test_steps_that_touch_are_dirty(standing: LocomotionPolicy) -> None:
 
 
 def test_names_that_others_read(standing: LocomotionPolicy) -> None:
-    results = evaluate_locomotor(standing, "litter", 2, 0.3)
+    results = compare_locomotors([standing], "litter", 2, 0.3)[0]
     assert results.config["ground"]["density"] == 10.0
     figures = results.aggregate
     assert figures["dirty_steps"] is None and figures["steps"] == 0

@@ -1,12 +1,25 @@
 """Recorded motion: the figures come out that were put in, and a standing robot stands."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from vinl.config.errors import InputError
-from vinl.courses.motion_fit import STEP, describe_sway, fit_execution, lag_commands, read_twists
-from vinl.courses.trunk_motion import MotionRecord, draw_commands, record_motion
 from vinl.policies.policy import LocomotionPolicy
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+from trunk_motion import (
+    STEP,
+    MotionRecord,
+    describe_sway,
+    draw_commands,
+    fit_execution,
+    lag_commands,
+    read_twists,
+    record_motion,
+)
 
 
 def drive(twists: np.ndarray) -> np.ndarray:

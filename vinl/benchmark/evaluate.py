@@ -23,13 +23,12 @@ from vinl.chain.records import Episode, Results
 from vinl.chain.workers import WorkerPool
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
+from vinl.config.limits import check_number
 from vinl.policies.policy import Policy
 from vinl.render.video import FilmJob
 from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers import open_floorplans
-
-MAX_EPISODES, MAX_SEEDS, MAX_WORKERS = 10_000, 1_000, 1_024
 
 
 def evaluate(
@@ -190,15 +189,10 @@ def check_numbers(episodes: int, seeds: int, first_seed: int, obstacles: str, wo
     Raises:
         InputError: one of them is out of range or unknown.
     """
-    for name, value, limit in (
-        ("episodes", episodes, MAX_EPISODES),
-        ("seeds", seeds, MAX_SEEDS),
-        ("workers", workers, MAX_WORKERS),
-    ):
-        if not 1 <= value <= limit:
-            raise InputError(f"--{name} must lie between 1 and {limit}, got {value}")
-    if not 0 <= first_seed < 2**31:
-        raise InputError(f"--first-seed must lie between 0 and {2**31 - 1}, got {first_seed}")
+    check_number("--episodes", episodes, 1, 10_000)
+    check_number("--seeds", seeds, 1, 1_000)
+    check_number("--workers", workers, 1, 1_024)
+    check_number("--first-seed", first_seed, 0, 2**31 - 1)
     if obstacles not in CLUTTER:
         raise InputError(
             f"--obstacles {obstacles!r} is not a preset{closest(obstacles, CLUTTER)}; known: {', '.join(CLUTTER)}"

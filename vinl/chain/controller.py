@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float
 
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.chain.gait_reader import GaitReader, map_plan
-from vinl.chain.ground_map import GroundMap
 from vinl.chain.real_cameras import CameraErrors, RealCameras
+from vinl.chain.scan_reader import ScanReader
 from vinl.config.errors import InputError
 from vinl.gait.observation import SENSED_TABLE, insert_gait
 from vinl.policies.card import PolicyCard, find_detour, find_gait, reads_ground
@@ -45,7 +45,7 @@ class LocomotionController:
     def __init__(
         self,
         policy: Policy,
-        scan: GroundMap | None,
+        scan: ScanReader | None,
         cameras: DepthCameras | RealCameras | None,
         gait: GaitReader | None = None,
     ) -> None:
@@ -104,7 +104,7 @@ def open_controller(
 ) -> LocomotionController:
     """The controller of robots in a floor plan, each with its own clutter, see ``open_depth_cameras``; ``errors`` are
     those of their cameras."""
-    scan = GroundMap(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
+    scan = ScanReader(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
     cameras = None if locomotor.camera is None else open_depth_cameras(plan, blocks, locomotor.camera, ceiling)
     config = find_gait(locomotor.card)
     gait = None if config is None else GaitReader(config, map_plan(plan, blocks))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from vinl.config.output import round_numbers
 from vinl.world.floorplan import FloorPlan
 
 Key = tuple[str, int, int]
@@ -173,11 +174,5 @@ class Results:
 
 
 def plain_record(record: EpisodeRecord) -> dict[str, Any]:
-    """A record as plain data, lengths rounded to 0.1 mm and rates to six digits."""
-    return {key: _rounded(value) for key, value in asdict(record).items()}
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, (tuple, list)):
-        return [_rounded(v) for v in value]
-    return round(value, 6) if isinstance(value, float) else value
+    """A record as plain data, numbers rounded to six digits after the point."""
+    return round_numbers(asdict(record))

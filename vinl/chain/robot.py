@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterable, Sequence
 
 import mujoco
@@ -10,8 +11,22 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.chain.contacts import ContactReader
-from vinl.chain.delay_line import DelayLine
 from vinl.robot.aliengo import CONTROL_DT, STANDING_HEIGHT, SUBSTEPS, home_qpos
+
+
+class DelayLine:
+    """Hands joint targets on some physics steps late."""
+
+    def __init__(self, late: int, first: Float[np.ndarray, "12"]) -> None:
+        """``late`` in physics steps; ``first`` is what the motors hold before anything arrives."""
+        self._late, calls = late, -(-late // SUBSTEPS)
+        self._targets = deque([first.copy() for _ in range(calls + 1)], maxlen=calls + 1)
+
+    def push(self, target: Float[np.ndarray, "12"]) -> list[Float[np.ndarray, "12"]]:
+        """What reaches the motors in each of the next physics steps."""
+        self._targets.append(target.copy())
+        newest = len(self._targets) - 1
+        return [self._targets[newest + (s - self._late) // SUBSTEPS] for s in range(SUBSTEPS)]
 
 
 class Robot:
@@ -38,7 +53,7 @@ class Robot:
         self.qpos[7:] = joints
         mujoco.mj_forward(self.model, self.data)
         self._time = 0.0
-        self._line = DelayLine(self._late, joints, SUBSTEPS) if self._late else None
+        self._line = DelayLine(self._late, joints) if self._late else None
 
     def step(self, target: Float[np.ndarray, "12"]) -> None:
         """Drive to joint targets [rad] for one control step, and latch the contacts of its physics steps."""

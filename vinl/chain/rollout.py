@@ -9,13 +9,13 @@ import numpy as np
 from vinl.chain.batching import ask_only, batch_navigator, batch_policy
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.controller import open_controller
-from vinl.chain.dead_reckoning import DeadReckoning
 from vinl.chain.depth_cameras import open_depth_cameras
 from vinl.chain.episode import EpisodeSetup, draw_faults, sensor_key
 from vinl.chain.fault_config import FaultConfig
 from vinl.chain.faults import FaultyState, change_body
 from vinl.chain.metrics import tracking_errors
 from vinl.chain.navigators.base import Navigator, Task, decide
+from vinl.chain.odometry import DeadReckoning
 from vinl.chain.real_cameras import CameraErrors
 from vinl.chain.recorder import Recorder
 from vinl.chain.records import Episode

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vinl.cli.options import Settings, parse_options, settings_first
-from vinl.cli.places import default_out
+from vinl.cli.options import Settings, default_out, parse_options, settings_first
 from vinl.config.errors import InputError
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vinl.cli.options import parse_options
-from vinl.cli.places import default_out
+from vinl.cli.options import default_out, parse_options
 from vinl.config.errors import InputError
 
 if TYPE_CHECKING:
@@ -138,9 +137,8 @@ def _run_bars(options: Options, names: list[str], out: Path, command: list[str])
     from vinl.cli.progress import Progress
     from vinl.config.output import write_json
     from vinl.courses.bars import BarConfig
-    from vinl.courses.crossing_report import crossings_as_dict, picture_crossings, print_crossings
     from vinl.courses.evaluate_crossings import check_crossing_numbers, compare_crossings
-    from vinl.courses.report import label_policies
+    from vinl.courses.report import label_policies, picture_crossings, print_crossings, results_as_dict
 
     heights, depth, speed, crossings = (_chosen(options, name) for name in _BARS)
     workers = _count_workers(options)
@@ -153,7 +151,7 @@ def _run_bars(options: Options, names: list[str], out: Path, command: list[str])
             policies, heights, depth, speed, crossings, options.seed, options.video, workers, progress.show
         )
     compared = dict(zip(label_policies(names), results, strict=True))
-    write_json(out / "results.json", crossings_as_dict(compared, command, workers))
+    write_json(out / "results.json", results_as_dict(compared, command, workers))
     if options.video:
         picture_crossings(compared, out)
     print_crossings(console, compared)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import asdict, dataclass
 
-from vinl.cli.options import parse_options
-from vinl.cli.places import default_out
+from vinl.cli.options import default_out, parse_options
 from vinl.config.errors import InputError
 
 

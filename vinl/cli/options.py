@@ -77,6 +77,16 @@ def settings_first(options: type[Any], argv: list[str]) -> list[str]:
     return settings + others
 
 
+def default_out(command: str, *names: str) -> Path:
+    """``runs/eval-loco-nav`` for the command ``eval`` and these policies; of a folder, its name counts."""
+    words = []
+    for name in names:
+        path = Path(name.rstrip("/"))
+        last = path.parent.name if path.name == "policy" and path.parent.name else path.name
+        words.append(re.sub(r"[^\w.-]+", "_", last) or "run")
+    return Path("runs") / "-".join((command, *words))
+
+
 def _is_switch(field: dataclasses.Field[Any]) -> bool:
     return field.type in (bool, "bool")
 

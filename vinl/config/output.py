@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import numbers
 import os
 import tempfile
 from collections.abc import Sequence
@@ -53,6 +54,16 @@ def check_out(out: str | Path) -> Path:
             f"--out {out}: nothing can be written there ({error.strerror}); choose another folder"
         ) from None
     return out
+
+
+def round_numbers(value: Any) -> Any:
+    """Plain data with all floating point numbers to six digits after the point; tuples become lists."""
+    if isinstance(value, dict):
+        return {key: round_numbers(v) for key, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [round_numbers(v) for v in value]
+    is_float = isinstance(value, numbers.Real) and not isinstance(value, numbers.Integral)  # numpy's too
+    return round(float(value), 6) if is_float else value
 
 
 def write_text(path: Path, text: str) -> None:

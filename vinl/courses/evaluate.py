@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from vinl.chain.choose import check_locomotion_policy
 from vinl.chain.workers import Context, WorkerPool
-from vinl.config.errors import InputError
+from vinl.config.limits import check_number
 from vinl.courses.block_contacts import BINS, bin_heights
 from vinl.courses.courses import CommandRanges, Course, choose_commands, command_ranges
 from vinl.courses.grounds import DENSITY, Ground, GroundConfig, build_ground
@@ -23,19 +24,71 @@ from vinl.policies.identity import describe_policy
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT
 
+Record = TypeVar("Record")
+Part = TypeVar("Part")
+
 GROUP = 16
 """Robots in one unit of work. Fixed, so that results do not depend on the number of workers."""
 
 
 @dataclass(frozen=True, eq=False)
-class LocomotorResults:
-    """Records of the robots, the figures, and what they depend on."""
+class TrialResults(Generic[Record]):
+    """Records of one policy's robots or crossings, the figures, and what they depend on.
 
-    robots: list[RobotRecord]
+    Attributes:
+        records: in the order of their numbers; crossings by height as asked for, then by number.
+        aggregate: figures of all.
+        policies: digest of the policy's card.
+        config: everything that the run depends on.
+        wall_seconds: how long it took [s].
+    """
+
+    records: list[Record]
     aggregate: dict[str, Any]
     policies: dict[str, Any]
     config: dict[str, Any]
     wall_seconds: float
+
+
+@dataclass(frozen=True)
+class Group:
+    """A unit of work: robots or crossings of one policy, by their numbers."""
+
+    policy: int
+    numbers: range
+
+
+def run_groups(
+    work: Callable[[Context, Any], list[Part]],
+    shared: Any,
+    groups: Sequence[Group],
+    workers: int,
+    on_piece: Callable[[int], None],
+) -> tuple[list[list[Part]], float]:
+    """Work through all groups in worker processes.
+
+    Args:
+        work: called with each group; reports one piece for each of its numbers, and returns what came of them.
+        shared: what all groups have in common.
+        groups: in any order of the policies, with the numbers of each ascending.
+        workers: processes.
+        on_piece: called with how many numbers are done.
+
+    Returns:
+        What came of the numbers, by policy; how long it took [s].
+    """
+    began, done = time.perf_counter(), itertools.count(1)
+    with WorkerPool(min(workers, len(groups)), shared) as pool:
+        parts = pool.run(work, list(groups), lambda: on_piece(next(done)))
+    by_policy: list[list[Part]] = [[] for _ in {group.policy for group in groups}]
+    for group, part in zip(groups, parts, strict=True):
+        by_policy[group.policy] += part
+    return by_policy, time.perf_counter() - began
+
+
+def cut_groups(count: int) -> list[range]:
+    """The numbers of robots or crossings that walk side by side."""
+    return [range(first, min(first + GROUP, count)) for first in range(0, count, GROUP)]
 
 
 @dataclass(frozen=True)
@@ -44,30 +97,6 @@ class _Shared:
     grounds: list[GroundConfig]
     ranges: CommandRanges
     steps: int
-
-
-@dataclass(frozen=True)
-class _Job:
-    policy: int
-    robots: range
-
-
-def evaluate_locomotor(
-    policy: Policy,
-    terrain: str = "flat",
-    robots: int = 64,
-    seconds: float = 20.0,
-    seed: int = 0,
-    density: float | None = None,
-    level: int | None = None,
-    commands: str | None = None,
-    workers: int = 1,
-    on_progress: Callable[[str, int, int], None] = lambda *_: None,
-) -> LocomotorResults:
-    """One policy; see ``compare_locomotors``."""
-    return compare_locomotors([policy], terrain, robots, seconds, seed, density, level, commands, workers, on_progress)[
-        0
-    ]
 
 
 def compare_locomotors(
@@ -81,7 +110,7 @@ def compare_locomotors(
     commands: str | None = None,
     workers: int = 1,
     on_progress: Callable[[str, int, int], None] = lambda *_: None,
-) -> list[LocomotorResults]:
+) -> list[TrialResults[RobotRecord]]:
     """Let robots follow random commands; a robot that falls starts afresh. Every policy meets the same courses.
 
     Args:
@@ -107,21 +136,12 @@ def compare_locomotors(
         GroundConfig(terrain, density, level, seed, float(p.card.action["kp"]), float(p.card.action["kd"]))
         for p in policies
     ]
-    ranges, began, done = command_ranges(chosen, policies), time.perf_counter(), 0
-
-    def count() -> None:
-        nonlocal done
-        done += 1
-        on_progress("robot", done, robots * len(policies))
-
-    groups = [range(first, min(first + GROUP, robots)) for first in range(0, robots, GROUP)]
-    jobs = [_Job(p, group) for p in range(len(policies)) for group in groups]
-    shared = _Shared(list(policies), grounds, ranges, round(seconds / CONTROL_DT))
-    with WorkerPool(min(workers, len(jobs)), shared) as pool:
-        parts = pool.run(_run_group, jobs, count)
-    wall, results = time.perf_counter() - began, []
-    for p, policy in enumerate(policies):
-        records = [r for job, part in zip(jobs, parts, strict=True) if job.policy == p for r in part]
+    ranges = command_ranges(chosen, policies)
+    jobs = [Group(p, numbers) for p in range(len(policies)) for numbers in cut_groups(robots)]
+    shared, total = _Shared(list(policies), grounds, ranges, round(seconds / CONTROL_DT)), robots * len(policies)
+    parts, wall = run_groups(_run_group, shared, jobs, workers, lambda done: on_progress("robot", done, total))
+    results = []
+    for p, (policy, records) in enumerate(zip(policies, parts, strict=True)):
         config = {
             "ground": asdict(grounds[p]),
             "commands": {"name": chosen, **asdict(ranges)},
@@ -131,7 +151,7 @@ def compare_locomotors(
         }
         ground = _ground(grounds[p])
         figures = aggregate_robots(records, height_fractions(ground), ground.covered())
-        results.append(LocomotorResults(records, figures, {"locomotion": describe_policy(policy)}, config, wall))
+        results.append(TrialResults(records, figures, {"locomotion": describe_policy(policy)}, config, wall))
     return results
 
 
@@ -141,14 +161,10 @@ def check_locomotor_numbers(robots: int, seconds: float, seed: int, workers: int
     Raises:
         InputError: one of them is out of range.
     """
-    for name, value, low, high in (
-        ("robots", robots, 1, 100_000),
-        ("seconds", seconds, CONTROL_DT, 36_000),
-        ("seed", seed, 0, 2**31 - 1),
-        ("workers", workers, 1, 1024),
-    ):
-        if not low <= value <= high:
-            raise InputError(f"--{name} must lie between {low:g} and {high:g}, got {value:g}")
+    check_number("--robots", robots, 1, 100_000)
+    check_number("--seconds", seconds, CONTROL_DT, 36_000)
+    check_number("--seed", seed, 0, 2**31 - 1)
+    check_number("--workers", workers, 1, 1024)
 
 
 def choose_density(density: float | None, terrain: str) -> float:
@@ -168,12 +184,12 @@ def _ground(config: GroundConfig) -> Ground:
     return build_ground(config)
 
 
-def _run_group(context: Context, job: _Job) -> list[RobotRecord]:
+def _run_group(context: Context, job: Group) -> list[RobotRecord]:
     """Some of the robots of one policy, in lockstep."""
     shared: _Shared = context.shared
     config = shared.grounds[job.policy]
     ground = _ground(config)
-    courses = [Course(ground, shared.ranges, config.seed, k, shared.steps) for k in job.robots]
+    courses = [Course(ground, shared.ranges, config.seed, k, shared.steps) for k in job.numbers]
     herd = BoxHerd(ground.model, len(courses))
     records = run_trial(herd, ground, courses, shared.policies[job.policy], context.is_stopped)
     for _ in courses:

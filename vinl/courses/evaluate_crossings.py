@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,14 +11,15 @@ import numpy as np
 
 from vinl.chain.choose import check_locomotion_policy
 from vinl.chain.metrics import bootstrap_interval, wilson_interval
-from vinl.chain.workers import Context, WorkerPool
+from vinl.chain.workers import Context
 from vinl.config.errors import InputError
+from vinl.config.limits import check_number
+from vinl.config.output import round_numbers
 from vinl.courses.bars import APPROACH, SPREAD, WIDTH, BarConfig, build_corridor
 from vinl.courses.crossing import PATIENCE, CrossingRecord, CrossingTrace, cross_bar
-from vinl.courses.evaluate import GROUP
+from vinl.courses.evaluate import Group, TrialResults, cut_groups, run_groups
 from vinl.courses.gait_metrics import aggregate_gait
 from vinl.courses.grounds import Ground
-from vinl.courses.robot_records import round_figures
 from vinl.policies.identity import describe_policy
 from vinl.policies.policy import Policy
 
@@ -47,24 +47,14 @@ _STEPS = {
 
 
 @dataclass(frozen=True, eq=False)
-class CrossingResults:
-    """Records of one policy's crossings, the figures, and what they depend on.
+class CrossingResults(TrialResults[CrossingRecord]):
+    """Also the traces.
 
     Attributes:
-        records: ordered by height as asked for, then by number.
         traces: of the first ``TRACED`` crossings of every height [m]; empty if none were asked for.
-        aggregate: figures of all crossings; those of each height in ``by_height``.
-        policies: digest of the policy's card.
-        config: everything that the run depends on.
-        wall_seconds: how long it took [s].
     """
 
-    records: list[CrossingRecord]
     traces: dict[float, list[CrossingTrace]]
-    aggregate: dict[str, Any]
-    policies: dict[str, Any]
-    config: dict[str, Any]
-    wall_seconds: float
 
 
 @dataclass(frozen=True)
@@ -74,10 +64,8 @@ class _Shared:
 
 
 @dataclass(frozen=True)
-class _Job:
-    policy: int
+class _BarGroup(Group):
     bar: BarConfig
-    numbers: range
 
 
 def compare_crossings(
@@ -114,20 +102,13 @@ def compare_crossings(
         [BarConfig(h, depth, speed, seed, float(p.card.action["kp"]), float(p.card.action["kd"])) for h in heights]
         for p in policies
     ]
-    began, done, total = time.perf_counter(), 0, crossings * len(heights) * len(policies)
-
-    def count() -> None:
-        nonlocal done
-        done += 1
-        on_progress("crossing", done, total)
-
-    groups = [range(first, min(first + GROUP, crossings)) for first in range(0, crossings, GROUP)]
-    jobs = [_Job(p, bar, group) for p in range(len(policies)) for bar in bars[p] for group in groups]
-    with WorkerPool(min(workers, len(jobs)), _Shared(list(policies), traced)) as pool:
-        parts = pool.run(_run_group, jobs, count)
-    wall, results = time.perf_counter() - began, []
-    for p, policy in enumerate(policies):
-        own = [one for job, part in zip(jobs, parts, strict=True) if job.policy == p for one in part]
+    jobs = [
+        _BarGroup(p, numbers, bar) for p in range(len(policies)) for bar in bars[p] for numbers in cut_groups(crossings)
+    ]
+    shared, total = _Shared(list(policies), traced), crossings * len(heights) * len(policies)
+    parts, wall = run_groups(_run_group, shared, jobs, workers, lambda done: on_progress("crossing", done, total))
+    results = []
+    for p, (policy, own) in enumerate(zip(policies, parts, strict=True)):
         records = [record for record, _ in own]
         config = {
             "terrain": "bars",
@@ -142,7 +123,7 @@ def compare_crossings(
         figures = aggregate_crossings(records)
         figures["by_height"] = {f"{h:g}": aggregate_crossings([r for r in records if r.height == h]) for h in heights}
         traces = {h: [t for record, t in own if t is not None and record.height == h] for h in heights if traced}
-        results.append(CrossingResults(records, traces, figures, {"locomotion": describe_policy(policy)}, config, wall))
+        results.append(CrossingResults(records, figures, {"locomotion": describe_policy(policy)}, config, wall, traces))
     return results
 
 
@@ -154,13 +135,9 @@ def check_crossing_numbers(heights: Sequence[float], crossings: int, seed: int, 
     """
     if not 1 <= len(heights) <= MAX_HEIGHTS or len(set(heights)) < len(heights):
         raise InputError(f"--height takes 1 to {MAX_HEIGHTS} different heights [m], got {len(heights)}")
-    for name, value, low, high in (
-        ("crossings", crossings, 1, MAX_CROSSINGS),
-        ("seed", seed, 0, 2**31 - 1),
-        ("workers", workers, 1, 1024),
-    ):
-        if not low <= value <= high:
-            raise InputError(f"--{name} must lie between {low} and {high}, got {value}")
+    check_number("--crossings", crossings, 1, MAX_CROSSINGS)
+    check_number("--seed", seed, 0, 2**31 - 1)
+    check_number("--workers", workers, 1, 1024)
 
 
 def aggregate_crossings(records: Sequence[CrossingRecord]) -> dict[str, Any]:
@@ -187,7 +164,7 @@ def aggregate_crossings(records: Sequence[CrossingRecord]) -> dict[str, Any]:
     figures |= {"metres": metres, "speed": metres / seconds if seconds else None}
     figures |= aggregate_gait([r.gait for r in records], metres)
     figures["ci95"] = intervals
-    return round_figures(figures)
+    return round_numbers(figures)
 
 
 @lru_cache(maxsize=4)
@@ -195,7 +172,7 @@ def _corridor(config: BarConfig) -> Ground:
     return build_corridor(config)
 
 
-def _run_group(context: Context, job: _Job) -> list[tuple[CrossingRecord, CrossingTrace | None]]:
+def _run_group(context: Context, job: _BarGroup) -> list[tuple[CrossingRecord, CrossingTrace | None]]:
     """Some of the crossings of one policy at one height, in lockstep. Of traces only those asked for go back."""
     shared: _Shared = context.shared
     done = cross_bar(shared.policies[job.policy], job.bar, _corridor(job.bar), job.numbers, context.is_stopped)

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy import ndimage
 
-from vinl.chain.ground_map import GroundMap
+from vinl.chain.scan_reader import ScanReader
 from vinl.chain.scene import build_scene
 from vinl.config.errors import InputError
 from vinl.sensing.depth import Mesh
@@ -140,7 +140,7 @@ class Ground:
         return join_meshes(box_mesh(boxes), floor_mesh(_HORIZON))
 
 
-class FieldMap(GroundMap):
+class FieldScanReader(ScanReader):
     """Reads the height scan of robots that all walk on one height field."""
 
     def __init__(self, field: HeightField, detour: DetourConfig | None = None) -> None:

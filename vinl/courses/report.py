@@ -1,4 +1,4 @@
-"""What a locomotor's trial leaves behind: tables in the terminal, ``results.json``, a picture of the contacts."""
+"""What a trial of locomotion policies leaves behind: tables in the terminal, ``results.json``, pictures and films."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
-from vinl.config.output import SCHEMA
+from vinl.config.output import SCHEMA, round_numbers
 from vinl.config.versions import describe_environment
-from vinl.courses.evaluate import LocomotorResults
-from vinl.courses.robot_records import HEIGHT_NAMES
+from vinl.courses.crossing import CrossingRecord
+from vinl.courses.crossing_pictures import draw_feet, film_crossings
+from vinl.courses.evaluate import TrialResults
+from vinl.courses.evaluate_crossings import CrossingResults
+from vinl.courses.robot_records import HEIGHT_NAMES, RobotRecord
+from vinl.render.page import format_number, open_table
 
 _COLUMNS = (
     ("foot_block_per_m", "feet/m", 2),
@@ -59,6 +61,22 @@ _BARS = (
 )
 
 
+_FRACTIONS = (
+    ("clean_foot_crossings", "no foot"),
+    ("clean_leg_crossings", "no leg"),
+    ("clean_crossings", "clean"),
+    ("finished", "across"),
+    ("falls", "fell"),
+)
+"""Columns in per cent."""
+
+_MEANS = (
+    ("foot_steps_per_crossing", "feet"),
+    ("leg_steps_per_crossing", "legs"),
+)
+"""Columns in control steps on the bar per crossing."""
+
+
 def label_policies(names: Sequence[str]) -> list[str]:
     """Short names for a table: of a folder its last part, of a run's ``policy`` folder the run's; whole if unclear."""
     paths = [Path(name) for name in names]
@@ -66,9 +84,9 @@ def label_policies(names: Sequence[str]) -> list[str]:
     return [s if short.count(s) == 1 else name for s, name in zip(short, names, strict=True)]
 
 
-def print_figures(console: Console, results: LocomotorResults) -> None:
+def print_figures(console: Console, results: TrialResults[RobotRecord]) -> None:
     """Every figure of one policy with its interval."""
-    table = Table("figure", "value", "95 %", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = open_table("figure", ("value", "95 %"))
     intervals = results.aggregate["ci95"]
     for key, value in results.aggregate.items():
         if isinstance(value, (int, float)):
@@ -78,14 +96,11 @@ def print_figures(console: Console, results: LocomotorResults) -> None:
     _print_heights(console, {results.policies["locomotion"]["name"]: results})
 
 
-def print_comparison(console: Console, compared: Mapping[str, LocomotorResults]) -> None:
+def print_comparison(console: Console, compared: Mapping[str, TrialResults[RobotRecord]]) -> None:
     """One row for each policy."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("policy", overflow="fold", min_width=9)
     littered = all(r.config["ground"]["terrain"] == "litter" for r in compared.values())
     columns = _LITTER_COLUMNS if littered else _COLUMNS
-    for title in (*[title for _, title, _ in columns], "fell"):
-        table.add_column(title, justify="right", no_wrap=True)
+    table = open_table("policy", [*[title for _, title, _ in columns], "fell"])
     for name, results in compared.items():
         a, cells = results.aggregate, []
         for key, _, digits in columns:
@@ -100,53 +115,70 @@ def print_comparison(console: Console, compared: Mapping[str, LocomotorResults])
 
 def print_gait(console: Console, figures: Mapping[str, Mapping[str, Any]]) -> None:
     """How the robots walked, one row for each policy: see ``gait_metrics.aggregate_gait``."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("gait", overflow="fold", min_width=9)
-    for _, title, _, _ in _GAIT:
-        table.add_column(title, justify="right", no_wrap=True)
+    table = open_table("gait", [title for _, title, _, _ in _GAIT])
     for name, own in figures.items():
-        values = [(own.get(key), factor, digits) for key, _, factor, digits in _GAIT]
-        table.add_row(name, *["-" if v is None else f"{factor * v:.{digits}f}" for v, factor, digits in values])
+        table.add_row(name, *[format_number(own.get(key), digits, factor) for key, _, factor, digits in _GAIT])
     console.print(table)
 
 
-def _print_heights(console: Console, compared: Mapping[str, LocomotorResults]) -> None:
+def _print_heights(console: Console, compared: Mapping[str, TrialResults[RobotRecord]]) -> None:
     key = "foot_block_per_m_by_height"
     if not any(key in results.aggregate for results in compared.values()):
         return
-    table = Table(title="steps on blocks per metre, were all blocks so high [m]", box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("policy", overflow="fold", min_width=9)
-    table.add_column("", no_wrap=True)
-    for name in HEIGHT_NAMES:
-        table.add_column(name, justify="right", no_wrap=True)
+    table = open_table("policy", ["", *HEIGHT_NAMES], title="steps on blocks per metre, were all blocks so high [m]")
     for name, results in compared.items():
         for limb, title in (("foot", "feet"), ("leg", "legs")):
             row = results.aggregate[f"{limb}_block_per_m_by_height"]
-            table.add_row(name, title, *["-" if row[h] is None else f"{row[h]:.2f}" for h in HEIGHT_NAMES])
+            table.add_row(name, title, *[format_number(row[h]) for h in HEIGHT_NAMES])
     console.print(table)
 
 
-def results_as_dict(compared: Mapping[str, LocomotorResults], command: Sequence[str], workers: int) -> dict[str, Any]:
+def print_crossings(console: Console, compared: Mapping[str, CrossingResults]) -> None:
+    """One row for each policy and height, in per cent of the crossings with the half-width of the interval, then
+    control steps on the bar per crossing."""
+    first = next(iter(compared.values())).config
+    title = (
+        f"{first['crossings']} crossings each, bar {first['depth']:g} m deep, {first['speed']:g} m/s: % of the "
+        "crossings; control steps on the bar"
+    )
+    columns = ["cm", *[t for _, t in (*_FRACTIONS, *_MEANS)]]
+    table = open_table("policy", columns, title=title, title_justify="left")
+    for name, results in compared.items():
+        for height, figures in results.aggregate["by_height"].items():
+            fractions = [_percent(figures, key) for key, _ in _FRACTIONS]
+            means = [f"{figures[key]:.1f}" for key, _ in _MEANS]
+            table.add_row(name, f"{100 * float(height):g}", *fractions, *means)
+    console.print(table)
+    print_gait(console, {name: results.aggregate for name, results in compared.items()})
+
+
+def _percent(figures: Mapping[str, Any], key: str) -> str:
+    low, high = figures["ci95"][key]
+    return f"{100 * figures[key]:.0f} ±{50 * (high - low):.0f}"
+
+
+def results_as_dict(compared: Mapping[str, TrialResults[Any]], command: Sequence[str], workers: int) -> dict[str, Any]:
     """Results as plain data. One policy alone has its figures in ``aggregate``; of several each has its own in
-    ``compared``, and every robot's record names its policy."""
+    ``compared``, and every record of a robot or a crossing names its policy."""
     first = next(iter(compared.values()))
+    kind, own = ("crossings", "gains") if isinstance(first.records[0], CrossingRecord) else ("robots", "ground")
     data: dict[str, Any] = {"schema": SCHEMA, "command": list(command), "config": first.config}
-    wall = round(first.wall_seconds, 2)
+    data["environment"] = describe_environment()
     if len(compared) == 1:
-        data |= {"policies": first.policies, "environment": describe_environment(), "aggregate": first.aggregate}
-        data["robots"] = [asdict(record) for record in first.robots]
+        data |= {"policies": first.policies, "aggregate": first.aggregate}
+        data[kind] = [round_numbers(asdict(record)) for record in first.records]
     else:
-        data["environment"] = describe_environment()
         data["compared"] = {
-            name: {"policies": r.policies, "ground": r.config["ground"], "aggregate": r.aggregate}
-            for name, r in compared.items()
+            name: {"policies": r.policies, own: r.config[own], "aggregate": r.aggregate} for name, r in compared.items()
         }
-        data["robots"] = [{"policy": name, **asdict(record)} for name, r in compared.items() for record in r.robots]
-    data["timing"] = {"wall_seconds": wall, "workers": workers}
+        data[kind] = [
+            {"policy": n, **round_numbers(asdict(record))} for n, r in compared.items() for record in r.records
+        ]
+    data["timing"] = {"wall_seconds": round(first.wall_seconds, 2), "workers": workers}
     return data
 
 
-def draw_contacts(compared: Mapping[str, LocomotorResults], path: Path) -> None:
+def draw_contacts(compared: Mapping[str, TrialResults[RobotRecord]], path: Path) -> None:
     """Contacts per metre of front and rear feet and legs with their intervals, and of the feet by block height."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -173,3 +205,13 @@ def draw_contacts(compared: Mapping[str, LocomotorResults], path: Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=120)
+
+
+def picture_crossings(compared: Mapping[str, CrossingResults], out: Path) -> None:
+    """A film and a drawing for each height, of crossings that were traced."""
+    for height in next(iter(compared.values())).config["heights"]:
+        traces = {name: results.traces[height] for name, results in compared.items()}
+        depth = next(iter(compared.values())).config["depth"]
+        name = f"bar_{100 * height:g}cm"
+        draw_feet(traces, height, depth, out / f"{name}.png")
+        film_crossings({name: some[0] for name, some in traces.items()}, height, depth, out / f"{name}.mp4")

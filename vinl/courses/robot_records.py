@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.chain.metrics import BOOTSTRAP, wilson_interval
+from vinl.config.output import round_numbers
 from vinl.courses.block_contacts import BINS, HEIGHT_EDGES
 from vinl.courses.gait_metrics import GaitRecord, aggregate_gait
 from vinl.robot.aliengo import CONTROL_DT
@@ -117,7 +118,7 @@ def aggregate_robots(
                 for name, count, share in zip(HEIGHT_NAMES, steps, height_fractions, strict=True)
             }
     figures["ci95"] = intervals
-    return round_figures(figures)
+    return round_numbers(figures)
 
 
 def _columns(records: Sequence[RobotRecord]) -> dict[str, Float[np.ndarray, " n"]]:
@@ -142,12 +143,3 @@ def _columns(records: Sequence[RobotRecord]) -> dict[str, Float[np.ndarray, " n"
     ):
         named[name] = np.array([get(r) for r in records], np.float64)
     return named
-
-
-def round_figures(value: Any) -> Any:
-    """Plain data with all floating point numbers to six digits after the point."""
-    if isinstance(value, dict):
-        return {key: round_figures(v) for key, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [round_figures(v) for v in value]
-    return round(float(value), 6) if isinstance(value, (float, np.floating)) else value

@@ -14,7 +14,7 @@ from vinl.chain.metrics import tracking_errors
 from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import Course
 from vinl.courses.gait_metrics import record_gait
-from vinl.courses.grounds import FieldMap, Ground
+from vinl.courses.grounds import FieldScanReader, Ground
 from vinl.courses.herd import Herd
 from vinl.courses.robot_records import FRONT, REAR, RobotRecord
 from vinl.courses.step_counter import StepCounter
@@ -92,7 +92,7 @@ def run_trial(
 
 def controller_on_course(policy: Policy, ground: Ground, n: int) -> LocomotionController:
     """What a policy of n robots observes on a ground that all of them walk on."""
-    scan = FieldMap(ground.field, find_detour(policy.card)) if reads_ground(policy.card) else None
+    scan = FieldScanReader(ground.field, find_detour(policy.card)) if reads_ground(policy.card) else None
     cameras = None if policy.camera is None else DepthCameras([ground.mesh()], [0] * n, policy.camera)
     config = find_gait(policy.card)
     gait = None

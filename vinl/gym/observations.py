@@ -10,7 +10,7 @@ from gymnasium import spaces
 from jaxtyping import Float
 
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
-from vinl.chain.ground_map import GroundMap
+from vinl.chain.scan_reader import ScanReader
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.gym.trip import Trip
@@ -83,7 +83,7 @@ class AgentObservation:
             parts[image] = spaces.Box(0.0, 1.0, (camera.height, camera.width), np.float32)
         self.space = spaces.Dict(parts)
         self._depth: dict[str, DepthCameras] = {}
-        self._scan: GroundMap | None = None
+        self._scan: ScanReader | None = None
 
     def enter(self, trip: Trip, ceiling: float | None) -> None:
         """A new episode begins, in a home with or without a ceiling [m]."""
@@ -91,7 +91,7 @@ class AgentObservation:
         self._depth = {
             image: open_depth_cameras(plan, blocks, camera, ceiling) for image, camera in self._cameras.items()
         }
-        self._scan = GroundMap(plan, blocks) if self._with_scan else None
+        self._scan = ScanReader(plan, blocks) if self._with_scan else None
 
     def observe(
         self, trip: Trip, command: Float[np.ndarray, "1 3"], previous: Float[np.ndarray, "1 a"]

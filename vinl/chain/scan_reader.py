@@ -31,7 +31,7 @@ def rasterise_plan(plan: FloorPlan, reach: float = SCAN_RADIUS) -> HeightField:
     return field
 
 
-class GroundMap:
+class ScanReader:
     """Reads the height scan of all robots of a unit.
 
     The grids of the episodes are stacked along y; the look-up of robot k is moved to grid k. Episodes without blocks
