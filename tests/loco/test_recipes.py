@@ -21,7 +21,9 @@ SCRIPT = (ROOT / "scripts" / "reproduce.sh").read_text()
 def test_every_config_can_be_built(name: str) -> None:
     config = load_config(LocoConfig, f"loco/{name}")
     kinds = set(config.terrain.column_kinds())
-    assert kinds == {kind for kind, part in config.terrain.shares().items() if part > 0}  # none is too small to occur
+    assert kinds == {
+        kind for kind, part in config.terrain.fractions().items() if part > 0
+    }  # none is too small to occur
     small = load_config(LocoConfig, f"loco/{name}", ["terrain.levels=2", "terrain.columns=20"])
     assert set(build_terrain(small.terrain).kinds) == kinds
     assert config.terrain.ghost == 0 or config.stage == 2

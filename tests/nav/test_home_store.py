@@ -63,7 +63,7 @@ def test_a_home_without_a_path_is_dropped_and_counted(config):
     far = replace(config, episodes=EpisodeConfig(distance=(300.0, 400.0)))
     plan = load_floorplan("harbour_flat")
     why = prepare_home(plan, 1, far)
-    assert isinstance(why, str) and "hardly any way" in why
+    assert isinstance(why, str) and "hardly any path" in why
     with pytest.raises(InputError, match="300 m to 400 m"):
         HomeStore.from_plans([plan], far)
     near = replace(config, episodes=EpisodeConfig(distance=(17.0, 30.0)))  # only the largest homes

@@ -42,7 +42,7 @@ def test_camera_moves_as_told(config, homes):
         settings = replace(config, num_envs=400, motion=MotionConfig(**motion))
         environment = NavEnvironment(settings, homes)
         environment.observe()
-        return environment._eye[0].clone(), environment._eye[1][:, 2, 0].asin(), environment
+        return environment._camera_pose[0].clone(), environment._camera_pose[1][:, 2, 0].asin(), environment
 
     place, pitch, _ = look()
     assert pitch.abs().max() < 1e-6 and (place[:, 2] - 0.36).abs().max() < 1e-6
@@ -50,7 +50,7 @@ def test_camera_moves_as_told(config, homes):
     assert pitch.std().item() == pytest.approx(0.05, rel=0.15)
     environment.step(torch.zeros(400, 2))
     environment.observe()
-    assert np.corrcoef(pitch, environment._eye[1][:, 2, 0].asin())[0, 1] < 0.3
+    assert np.corrcoef(pitch, environment._camera_pose[1][:, 2, 0].asin())[0, 1] < 0.3
     place, pitch, environment = look(offset=(0.0, 0.07), height_offset=0.03)
     assert 0.06 < pitch.abs().max() <= 0.0701
     # pitched up by the trunk, a camera 0.35 m ahead rises
@@ -58,7 +58,7 @@ def test_camera_moves_as_told(config, homes):
     step = environment.step(torch.tensor([[-1.0, 0.0]]).expand(400, 2))
     environment.observe()
     kept = ~step.done
-    torch.testing.assert_close(environment._eye[1][kept, 2, 0].asin(), pitch[kept], atol=1e-5, rtol=0)
+    torch.testing.assert_close(environment._camera_pose[1][kept, 2, 0].asin(), pitch[kept], atol=1e-5, rtol=0)
     place, pitch, _ = look(uniform=math.pi / 6, with_trunk=False)
     assert pitch.std().item() == pytest.approx(math.pi / 6 / math.sqrt(3), rel=0.1)
     assert (place[:, 2] - 0.36).abs().max() < 1e-6
@@ -127,7 +127,7 @@ def test_an_image_is_as_old_and_the_camera_as_askew_as_drawn(config, homes):
     eyes = []
     for environment in (now, old):
         environment.observe()
-        eyes.append([part.clone() for part in environment._eye])
+        eyes.append([part.clone() for part in environment._camera_pose])
     kept = ~done & (now._blocked == 0)
     assert kept.sum() > 20
     heading = torch.atan2(eyes[0][1][:, 1, 0], eyes[0][1][:, 0, 0]) - torch.atan2(

@@ -28,7 +28,7 @@ def inner_dataclass(kind: Any) -> Any | None:
 
 
 def field_type(kind: Any, key: str, prefix: str, source: str) -> Any:
-    """Annotation of ``key`` in the dataclass or mapping type ``kind``; ``prefix`` is the dotted way to it.
+    """Annotation of ``key`` in the dataclass or mapping type ``kind``; ``prefix`` is the dotted path to it.
 
     Raises:
         InputError: there is no such key.

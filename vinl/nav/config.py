@@ -27,10 +27,10 @@ class HomesConfig:
             of a JSON file's plans as ``FILE:0-49``.
         layouts: fraction of the generated homes of each other layout, such as ``office: 0.2``; the rest are as
             ``generator`` has it. See ``vinl.world.homes.config.layout_config``.
-        plans_share: share of the homes that are made from ``plans``, each time with other goals and starts.
+        plans_share: fraction of the homes that are made from ``plans``, each time with other goals and starts.
         goals: goals in each home, each with a distance field.
         starts: spots in each home that starts are drawn from.
-        path_radius: ways to the goal keep this distance from walls and furniture [m] [paper: agent radius 0.22].
+        path_radius: paths to the goal keep this distance from walls and furniture [m] [paper: agent radius 0.22].
         start_clearance, goal_clearance: starts and goals keep this distance from walls and furniture [m].
         workers: processes that build homes; null: one for each core but one. 0: none, all is built in place.
     """
@@ -101,7 +101,7 @@ class ClutterConfig:
     """Blocks on the floor that the camera sees and that the robot steps over: they never stop it.
 
     Attributes:
-        share: share of the homes with blocks.
+        share: fraction of the homes with blocks.
         density: range of blocks for each m2 of free floor, drawn for each home.
         spacing: least distance between two blocks' centres [m].
         length: range of the long side [m].

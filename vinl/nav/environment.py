@@ -95,7 +95,7 @@ class NavEnvironment:
         self.state["action"] = self._zeros(n, 2)
         self.state["chance"] = self._zeros(2, dtype=torch.int32)
         self._moved, self._blocked, self._straight = (self._zeros(n) for _ in range(3))
-        self._eye = self._zeros(n, 3), self._zeros(n, 3, 3)
+        self._camera_pose = self._zeros(n, 3), self._zeros(n, 3, 3)
         self._sensor: DepthSensor | None = None
         if self.camera is not None:
             self._sensor = DepthSensor(config.sensors, self.camera, n, self.device)
@@ -117,8 +117,8 @@ class NavEnvironment:
             "blocked": wp.from_torch(self._blocked),
             "straight": wp.from_torch(self._straight),
             "chosen": wp.from_torch(self._chosen),
-            "eye": wp.from_torch(self._eye[0], dtype=wp.vec3),
-            "turn": wp.from_torch(self._eye[1], dtype=wp.mat33),
+            "camera": wp.from_torch(self._camera_pose[0], dtype=wp.vec3),
+            "rotation": wp.from_torch(self._camera_pose[1], dtype=wp.mat33),
             "key": wp.from_torch(self._key),
         }
         self._measures = Measures(self.device)
@@ -162,8 +162,8 @@ class NavEnvironment:
 
     def read_measures(self) -> dict[str, float]:
         """Means over the episodes that ended since the last call (``success``, ``spl``, ``soft_spl``, ``collisions``,
-        ``steps``, ``path`` and ``start_distance``, ``end_distance`` [m], shares that were ``stuck``, ``looping``,
-        ``out_of_time``; absent if none ended), their number ``episodes``; over all steps ``reward``, the share
+        ``steps``, ``path`` and ``start_distance``, ``end_distance`` [m], fractions that were ``stuck``, ``looping``,
+        ``out_of_time``; absent if none ended), their number ``episodes``; over all steps ``reward``, the fraction
         ``blocked``, ``step_length`` [m]; and how many were ``unplaced``: started off the range of distances, because no
         start within it was found. The host waits here."""
         return self._measures.read(self.state["unplaced"])
@@ -344,15 +344,15 @@ class NavEnvironment:
         if self.camera is None or self._sensor is None:
             return torch.zeros(n, 0, 0, dtype=torch.float16, device=self.device), vector
         depth = torch.empty(n, self.camera.height, self.camera.width, dtype=torch.float16, device=self.device)
-        self._launch(aim_cameras, n, [self._rules, "chance", self._robots, self._sensor.cameras, "eye", "turn"])
+        self._launch(aim_cameras, n, [self._rules, "chance", self._robots, self._sensor.cameras, "camera", "rotation"])
         self._launch(
             render_interior,
             tuple(depth.shape),
-            [self.homes.homes, self._rules, self._robots, "eye", "turn", wp.from_torch(depth)],
+            [self.homes.homes, self._rules, self._robots, "camera", "rotation", wp.from_torch(depth)],
         )
         if self._sensor.config.spoils:
             self._launch(draw_keys, n, ["chance", _DRAWN_AT_LOOK, "key"])
-            depth = self._sensor.spoil(depth, self._rows, self._key, *self._eye, unit=self.camera.far)
+            depth = self._sensor.spoil(depth, self._rows, self._key, *self._camera_pose, unit=self.camera.far)
             depth = settle_missing(self.camera.missing, depth, ~(depth > 0))
         return depth, vector
 

@@ -49,7 +49,7 @@ class NavEvaluation:
         distance: range of the geodesic distance at the start [m].
         steps: an episode ends after so many decisions of 0.5 s [paper code: 250].
         goals: in each home.
-        clutter: share of the homes with blocks that are seen but stop no robot.
+        clutter: fraction of the homes with blocks that are seen but stop no robot.
         start_clearance: starts keep this distance from walls and furniture [m]; the rectangle turns on the spot with
             0.36 m, and starts lie up to 0.07 m off the cells' centres. In ``vinl eval`` it is 0.5 m [paper].
     """

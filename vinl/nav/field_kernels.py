@@ -31,7 +31,7 @@ def spread_distances(
 ):
     """Dijkstra's search with buckets, one thread a goal. Cells of mask 2 are passed, cells of mask 1 only reached.
 
-    ``distance`` begins far off, and below 0 where no way enters. ``head`` holds a linked list of waiting entries for
+    ``distance`` begins far off, and below 0 where no path enters. ``head`` holds a linked list of waiting entries for
     each bucket, ``following`` and ``cell`` the entries.
     """
     k = wp.tid()

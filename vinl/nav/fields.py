@@ -22,11 +22,11 @@ _FAR, _CLOSED = 2**30, -1
 def spread_fields(
     mask: UInt8[np.ndarray, "rows columns"], goals: Int[np.ndarray, "k 2"], resolution: float
 ) -> Float[np.ndarray, "rows columns k"]:
-    """Length of the shortest way to every goal from every cell, over a grid with 16 neighbours (straight, diagonal
+    """Length of the shortest path to every goal from every cell, over a grid with 16 neighbours (straight, diagonal
     and knight's moves): at most 2.8 % longer than the true one in open space, 1 % on average.
 
     Args:
-        mask: 2 where ways may lead, 1 where they may only begin (nearer to a wall than a way should lead), 0 elsewhere.
+        mask: 2 where paths may lead, 1 where they may only begin (too near to a wall to lead on), 0 elsewhere.
         goals: cells (row, column), each of mask 2.
         resolution: side of a cell [m].
 
@@ -40,7 +40,7 @@ def spread_fields(
     cost = np.rint(np.hypot(steps[:, 0], steps[:, 1]) * _UNIT).astype(np.int32)
     start = ((goals[:, 0] + _BORDER) * width + goals[:, 1] + _BORDER).astype(np.int32)
     count = len(goals)
-    # cells that no way enters are nearer than anything, so that one comparison tells both
+    # cells that no path enters are nearer than anything, so that one comparison tells both
     distance = np.tile(np.where(padded.ravel() == 0, _CLOSED, _FAR).astype(np.int32), (count, 1))
     pool = 2 * cells
     wp.launch(

@@ -114,33 +114,33 @@ class NavEnv(gymnasium.Env):
         self.render_mode = render_mode
         self.environment = _build(config, 1, homes, plans, device, overrides, store)
         self.observation_space, self.action_space = _describe_spaces(self.environment)
-        self._way: list[np.ndarray] = []
+        self._path: list[np.ndarray] = []
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin a new episode; the same seed gives the same one."""
         super().reset(seed=seed, options=options)
         self.environment.restart(seed=int(self.np_random.integers(2**31)))
-        self._way = [self._position()]
+        self._path = [self._position()]
         return _first(_observation(self.environment)), self._info()
 
     def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """An action (2,) in [-1, 1] to observation, reward, whether the goal is reached, whether time is out, info."""
         reward, done, timeout = self.environment.advance(torch.as_tensor(np.asarray(action), dtype=torch.float32)[None])
-        self._way.append(self._position())
+        self._path.append(self._position())
         info, out = self._info(), bool(timeout)
         if bool(done):
             info["record"] = {name: value[0].item() for name, value in _figures(self.environment.ended).items()}
         return _first(_observation(self.environment)), float(reward), bool(done) and not out, out, info
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
-        """The home from above with the way so far, beside what the camera sees: (height, width, 3) uint8."""
+        """The home from above with the path so far, beside what the camera sees: (height, width, 3) uint8."""
         if self.render_mode is None:
             return None
         environment, state = self.environment, self.environment.state
         depth, _ = environment.observe()
         return draw_robot(
             environment.homes.records[int(state["home"])],
-            np.array(self._way or [self._position()]),
+            np.array(self._path or [self._position()]),
             float(state["yaw"]),
             environment.goals()[0].cpu().numpy(),
             depth[0].float().clamp(min=0.0).cpu().numpy(),

@@ -32,13 +32,13 @@ REACH = 0.6
 """Clearance is known up to this [m]; more than half the robot's diagonal."""
 
 FRINGE = 0.12
-"""The distance to the goal is also known where the robot's middle is off the ways, but this far from walls [m]."""
+"""The distance to the goal is also known where the robot's middle is off the paths, but this far from walls [m]."""
 
 _OVER_CAMERA = 0.6
 """No motion lifts the camera by so much [m]."""
 
 _LEAST_PAIRS = 0.01
-"""At least this share of start and goal pairs must lie within the range of distances."""
+"""At least this fraction of start and goal pairs must lie within the range of distances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +183,7 @@ def prepare_home(plan: FloorPlan, seed: int, config: NavConfig) -> BuiltHome | s
     low, high = config.episodes.distance
     reach = fields[starts[:, 0], starts[:, 1]]
     if ((reach >= low) & (reach <= high)).mean() < _LEAST_PAIRS:
-        return f"{plan.name}: hardly any way is {low:g} m to {high:g} m long"
+        return f"{plan.name}: hardly any path is {low:g} m to {high:g} m long"
     boxes = plan.boxes
     if not len(boxes):
         return f"{plan.name}: there are no walls"

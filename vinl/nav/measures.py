@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from vinl.world.endings import LOOPING_WAYS
+from vinl.world.endings import LOOPING_PATHS
 
 STUCK_STEPS = 10
 """An episode that runs out of time after at least so many cancelled steps in a row counts as stuck."""
@@ -23,10 +23,10 @@ class EpisodeEnd(NamedTuple):
         home: slot of the home.
         success: 1 where the goal was reached.
         spl: success weighted by path length [Anderson et al. 2018].
-        soft_spl: the share of the way that was made, weighted likewise [habitat].
+        soft_spl: the fraction of the path that was made, weighted likewise [habitat].
         collisions: cancelled steps.
         steps: of the episode.
-        path: way moved [m].
+        path: path moved [m].
         start_distance, end_distance: geodesic distance to the goal [m].
         stuck, looping, out_of_time: 1 for the reason why the goal was not reached.
     """
@@ -58,7 +58,7 @@ def end_episodes(state: Mapping[str, Tensor], counted: Bool[Tensor, " n"], succe
     progress = (1.0 - end / start).clamp(0.0, 1.0)
     late = 1.0 - reached
     stuck = late * (state["in_a_row"] >= STUCK_STEPS)
-    looping = late * (1.0 - stuck) * (path > LOOPING_WAYS * start)
+    looping = late * (1.0 - stuck) * (path > LOOPING_PATHS * start)
     return EpisodeEnd(
         counted=counted,
         home=state["home"].clone(),

@@ -19,10 +19,10 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 @no_type_check
-def mix(between: wp.vec2, share: wp.float32) -> wp.float32:
+def mix(between: wp.vec2, fraction: wp.float32) -> wp.float32:
     """From one end of a range to the other. Draws stay in the kernels: a function gets a copy of the random state, and
     what follows it would draw the same numbers again."""
-    return between[0] + (between[1] - between[0]) * share
+    return between[0] + (between[1] - between[0]) * fraction
 
 
 @wp.func
@@ -81,7 +81,7 @@ def move_robots(
     """One step: constant speed, slip and yaw rate over the period. If the swept rectangle touches, it is cancelled as a
     whole, or all but its turn (``Rules.give_way``).
 
-    Writes pose, velocity and distance of the robots, the way moved [m], 1 where it touched, and the straight distance
+    Writes pose, velocity and distance of the robots, the path moved [m], 1 where it touched, and the straight distance
     to the goal [m]. Where the goal cannot be reached from the new place, the distance stays as it was.
     """
     n = wp.tid()
@@ -90,18 +90,18 @@ def move_robots(
     gain = robots.gain[n]
     a0 = wp.clamp(action[n][0], -1.0, 1.0)
     a1 = wp.clamp(action[n][1], -1.0, 1.0)
-    v_told = (rules.min_speed + 0.5 * (a0 + 1.0) * (rules.max_speed - rules.min_speed)) * gain[0]
-    w_told = a1 * rules.max_yaw_rate * gain[1]
+    v_command = (rules.min_speed + 0.5 * (a0 + 1.0) * (rules.max_speed - rules.min_speed)) * gain[0]
+    w_command = a1 * rules.max_yaw_rate * gain[1]
     # a first-order lag: the mean over the period, and what is left of the old velocity at its end
     mean = float(0.0)
     last = float(0.0)
     if rules.lag > 0.0:
         last = wp.exp(-rules.period / rules.lag)
         mean = (1.0 - last) * rules.lag / rules.period
-    v = v_told + (robots.speed[n] - v_told) * mean
-    w = w_told + (robots.yaw_rate[n] - w_told) * mean
-    v_end = v_told + (robots.speed[n] - v_told) * last
-    w_end = w_told + (robots.yaw_rate[n] - w_told) * last
+    v = v_command + (robots.speed[n] - v_command) * mean
+    w = w_command + (robots.yaw_rate[n] - w_command) * mean
+    v_end = v_command + (robots.speed[n] - v_command) * last
+    w_end = w_command + (robots.yaw_rate[n] - w_command) * last
     pace = wp.abs(v) / rules.max_speed
     noisy = gain[3] * pace
     v = v + rules.speed_noise * wp.randn(state) * noisy
@@ -147,9 +147,9 @@ def move_robots(
     heading = yaw + w * rules.period
     robots.previous[n] = wp.vec2(a0, a1)
     if rules.sees_motion != 0:
-        share = (v - rules.min_speed) / (rules.max_speed - rules.min_speed)
+        fraction = (v - rules.min_speed) / (rules.max_speed - rules.min_speed)
         robots.previous[n] = wp.vec2(
-            wp.clamp(2.0 * share - 1.0, -1.0, 1.0), wp.clamp(w / rules.max_yaw_rate, -1.0, 1.0)
+            wp.clamp(2.0 * fraction - 1.0, -1.0, 1.0), wp.clamp(w / rules.max_yaw_rate, -1.0, 1.0)
         )
     left = wp.sqrt(1.0 - rules.correlation * rules.correlation)
     new_roll = left * wp.randn(state)
@@ -197,7 +197,7 @@ def place_robots(
         home = wp.randi(state, 0, homes.goals.shape[0])
         goal = wp.randi(state, 0, homes.goals.shape[1])
         p = homes.starts[home, wp.randi(state, 0, homes.starts.shape[1])]
-        if tries < 128:  # later: the cells' centres, which are on the ways
+        if tries < 128:  # later: the cells' centres, which are on the paths
             p = p + FIELD * wp.vec2(wp.randf(state) - 0.5, wp.randf(state) - 0.5)
         yaw = 6.2831853 * wp.randf(state) - 3.1415926
         distance = read_distance(homes, home, goal, p)

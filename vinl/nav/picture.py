@@ -18,14 +18,14 @@ HEIGHT = 360
 
 _MARGIN = 0.4
 _PAPER, _WALL, _LOW, _BLOCK = "#f6f1e7", "#2f3437", "#d3c1a5", "#c8a24a"
-_WAY, _ROBOT, _GOAL = "#1f5fa8", "#2a7f62", "#c8553d"
+_PATH, _ROBOT, _GOAL = "#1f5fa8", "#2a7f62", "#c8553d"
 _TALL = 2.0
 _LINTEL = 0.6
 
 
 def draw_robot(
     home: HomeRecord,
-    way: Float[np.ndarray, "k 2"],
+    path: Float[np.ndarray, "k 2"],
     yaw: float,
     goal: Float[np.ndarray, " 2"],
     depth: Float[np.ndarray, "height width"] | None,
@@ -35,7 +35,7 @@ def draw_robot(
 
     Args:
         home: what stands where.
-        way: places so far [m], the last one is the robot's.
+        path: places so far [m], the last one is the robot's.
         yaw: heading [rad].
         goal: [m].
         depth: in [0, 1], near is dark; None or empty: the plan alone.
@@ -60,12 +60,12 @@ def draw_robot(
     ((x, y),) = pixels(goal)
     radius = 0.325 * scale
     pen.ellipse((x - radius, y - radius, x + radius, y + radius), outline=_GOAL, width=3)
-    if len(way) > 1:
-        pen.line(pixels(way), fill=_WAY, width=2)
-    body = Boxes(np.array([[*way[-1], yaw, robot.length, robot.width, 0.0, 1.0]])).corners()[0]
+    if len(path) > 1:
+        pen.line(pixels(path), fill=_PATH, width=2)
+    body = Boxes(np.array([[*path[-1], yaw, robot.length, robot.width, 0.0, 1.0]])).corners()[0]
     pen.polygon(pixels(body), fill=_ROBOT)
-    nose = way[-1] + robot.length / 2 * np.array([math.cos(yaw), math.sin(yaw)])
-    pen.line(pixels(np.stack([way[-1], nose])), fill=_PAPER, width=2)
+    nose = path[-1] + robot.length / 2 * np.array([math.cos(yaw), math.sin(yaw)])
+    pen.line(pixels(np.stack([path[-1], nose])), fill=_PAPER, width=2)
     picture = np.asarray(image)
     if depth is None or depth.size == 0:
         return picture.copy()

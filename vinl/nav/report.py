@@ -70,7 +70,7 @@ def choose_drawn(records: Sequence[Any]) -> tuple[list[int], list[int]]:
 
 
 def draw_episode(record: Any, trace: Any) -> str:
-    """The home with the way through it, as SVG text."""
+    """The home with the path through it, as SVG text."""
     solid = Boxes(np.asarray(trace.solid, np.float64))
     corners = solid.corners().reshape(-1, 2)
     low, high = corners.min(0) - _MARGIN, corners.max(0) + _MARGIN
@@ -78,12 +78,12 @@ def draw_episode(record: Any, trace: Any) -> str:
     (sx, sy), (gx, gy) = record.start, record.goal
     ex, ey = trace.path[-1]
     lost = "" if record.success else f'<path class="lost" d="M{ex - 0.15:.2f} {-ey - 0.15:.2f}l.3 .3m0-.3l-.3 .3"/>'
-    way = trace.path if len(trace.path) > 1 else np.repeat(trace.path, 2, 0)
+    path = trace.path if len(trace.path) > 1 else np.repeat(trace.path, 2, 0)
     return (
         f'<svg class="map {record.end_reason}" viewBox="{low[0]:.2f} {-high[1]:.2f} {width:.2f} {height:.2f}" '
         f'role="img"><path class="wall" d="{outline_boxes(keep_low(solid))}"/>'
         f'<path class="block" d="{outline_boxes(Blocks(np.asarray(trace.blocks, np.float64)).boxes())}"/>'
-        f'<path class="way" d="{outline_path(np.asarray(way))}"/>{lost}'
+        f'<path class="way" d="{outline_path(np.asarray(path))}"/>{lost}'
         f'<circle class="start" cx="{sx:.2f}" cy="{-sy:.2f}" r="{LENGTH / 5:.2f}"/>'
         f'<circle class="goal" cx="{gx:.2f}" cy="{-gy:.2f}" r="{LENGTH / 2:.2f}"/></svg>'
     )

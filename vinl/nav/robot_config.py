@@ -1,5 +1,5 @@
 """The robot of a navigation environment: its body, its camera and how that moves, its images, and how it carries out
-what it is told (sections ``robot``, ``camera``, ``motion``, ``view`` and ``execution`` of a config)."""
+what it is commanded (sections ``robot``, ``camera``, ``motion``, ``view`` and ``execution`` of a config)."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ class ViewConfig:
     """What else differs in the images.
 
     Attributes:
-        ceiling_share: share of the episodes with a ceiling.
+        ceiling_share: fraction of the episodes with a ceiling.
         ceiling: range of its height [m].
     """
 
@@ -155,8 +155,8 @@ class ExecutionConfig:
         side_slip: standard deviation of a step's mean sideways speed [m/s], in proportion to the forward speed.
         yaw_drift: yaw rate of an episode when walking at full speed, uniform within +- this [rad/s].
         amplitude: range of a factor of an episode on the noises and the slip, uniform; 0 is sure of foot.
-        give_way: a step that would touch something is not cancelled as a whole: the robot turns on the spot as told,
-            and what its corners meet pushes it so far back or aside at most [m]; 0: cancelled as a whole [paper].
+        give_way: a step that would touch something is not cancelled as a whole: the robot turns on the spot, and
+            what its corners meet pushes it so far back or aside at most [m]; 0: cancelled as a whole [paper].
     """
 
     lag: float = 0.0

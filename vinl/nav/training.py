@@ -166,11 +166,11 @@ def train_navigator(
             write(model, samples, run.policy)
             save_critic(model, run.path)
 
-    def schedule(learner: RecurrentPPO, share: float) -> None:
-        learner.rate.limit(*config.ppo.rate_limits(share))
-        learner.entropy = config.ppo.entropy_at(share)
+    def schedule(learner: RecurrentPPO, fraction: float) -> None:
+        learner.rate.limit(*config.ppo.rate_limits(fraction))
+        learner.entropy = config.ppo.entropy_at(fraction)
         if config.ppo.last_log_std is not None:
-            learner.model.limit_spread(config.ppo.spread_at(share))
+            learner.model.limit_spread(config.ppo.spread_at(fraction))
         done, warmup = loop.current_learning_iteration, config.ppo.critic_warmup
         learner.let_actor_learn(done >= warmup)
         if done == warmup > 0:  # it rose while the actor stood still
@@ -246,7 +246,7 @@ def check_seeds(config: NavConfig, processes: int) -> None:
 
 
 def separate(config: NavConfig, rank: int, count: int = 1) -> NavConfig:
-    """The configuration with a process's own homes and random numbers, and its share of the cores."""
+    """The configuration with a process's own homes and random numbers, and its fraction of the cores."""
     workers = config.homes.workers
     if workers is None and count > 1:
         workers = max((os.cpu_count() or 1) // count - 1, 1)

@@ -93,7 +93,7 @@ def render_interior(
     rotation: wp.array(dtype=wp.mat33),
     depth: wp.array(dtype=wp.float16, ndim=3),
 ):
-    """Depth along the optical axis as a share of the far limit, one thread a pixel. Floor and ceiling are planes: no
+    """Depth along the optical axis as a fraction of the far limit, one thread a pixel. Floor and ceiling are planes: no
     rays are lost on them, and none leaves a home through its floor."""
     n, row, column = wp.tid()
     direction = rotation[n] * look_through(row, column, depth.shape[1], depth.shape[2], rules.tan_half)

@@ -103,7 +103,7 @@ class TrainingLoop:
         device: torch device.
         export: called after every checkpoint with the policy and the samples so far; writes the policy.
         figures: picks what the progress bar shows from an iteration's measures.
-        schedule: called before every iteration with the algorithm and the share of the training done, to move settings.
+        schedule: called before every iteration with the algorithm and the fraction of the training that is done.
         save_every: seconds between checkpoints.
         stopwatch: whose parts go into the curves where it ran.
 
@@ -199,9 +199,11 @@ class TrainingLoop:
             else TrainingProgress(round(60 * minutes), unit="second")
         )
         with bar as progress, self._interruptible(progress):
-            while (share := self._share_done(iterations, begun, minutes)) < 1 and not self._stop and wrong is None:
+            while (
+                (fraction := self._fraction_done(iterations, begun, minutes)) < 1 and not self._stop and wrong is None
+            ):
                 start = time.perf_counter()
-                self.schedule(self.alg, share)
+                self.schedule(self.alg, fraction)
                 observation = self._roll_out(observation)
                 collected = time.perf_counter()
                 losses = self._learn()
@@ -242,12 +244,12 @@ class TrainingLoop:
         writer.close()
         if wrong is not None:
             raise NotFiniteError(wrong if kept else f"{wrong}; the policy is not finite either: the checkpoint is old")
-        return share >= 1
+        return fraction >= 1
 
-    def _share_done(self, iterations: int, begun: float, minutes: float | None) -> float:
+    def _fraction_done(self, iterations: int, begun: float, minutes: float | None) -> float:
         """Of iterations or of the time since ``begun``, whichever is more."""
-        share = self.current_learning_iteration / iterations
-        return share if minutes is None else max(share, (time.monotonic() - begun) / (60 * minutes))
+        fraction = self.current_learning_iteration / iterations
+        return fraction if minutes is None else max(fraction, (time.monotonic() - begun) / (60 * minutes))
 
     def _roll_out(self, observation: Any) -> Any:
         with torch.inference_mode():

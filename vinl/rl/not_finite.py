@@ -11,7 +11,7 @@ import torch
 from vinl.rl.run_folder import LOST, RunFolder
 
 MAX_SHARE = 1e-3
-"""More than this share of an iteration's robot steps ends the training; a single one never does."""
+"""More than this fraction of an iteration's robot steps ends the training; a single one never does."""
 
 
 class NotFiniteError(Exception):

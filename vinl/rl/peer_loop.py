@@ -52,10 +52,10 @@ class PeerLoop(TrainingLoop):
         with contextlib.redirect_stderr(io.StringIO()):
             return super().train(iterations, minutes)
 
-    def _share_done(self, iterations: int, begun: float, minutes: float | None) -> float:
+    def _fraction_done(self, iterations: int, begun: float, minutes: float | None) -> float:
         """The first process's clock counts: all must end after the same iteration, with the same settings."""
-        share = super()._share_done(iterations, begun, minutes)
-        return share if minutes is None else self.peers.first(share, self.device)
+        fraction = super()._fraction_done(iterations, begun, minutes)
+        return fraction if minutes is None else self.peers.first(fraction, self.device)
 
     def describe_policy(self) -> dict[str, float]:
         """Mean standard deviation of the actions."""

@@ -1,4 +1,4 @@
-"""Where robots believe to be: their own motion added up, with errors that grow with the way."""
+"""Where robots believe to be: their own motion added up, with errors that grow with the distance."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ class OdometryConfig:
         drift: range of the relative error of distances, drawn for an episode; too long or too short alike.
         yaw_bias: the heading is off by up to this times the drift for each metre more, to either side [rad/m]. At 0.1 a
             drift of 2 % turns the robot's idea of its heading by up to 0.11 deg a metre, and after 20 m it is off by
-            as much again to the side as along the way.
+            as much again to the side as along the path.
     """
 
     drift: Range = (0.0, 0.0)

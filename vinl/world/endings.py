@@ -11,9 +11,9 @@ END_REASONS = (SUCCESS, FALL, STUCK, LOOPING, TIMEOUT)
 MAX_TILT = math.radians(72)
 """A trunk tilted farther than this has fallen [rad], in training and in every evaluation."""
 
-LOOPING_WAYS = 3.0
-"""A robot that ran out of time and was not stuck, but moved more than so many times the shortest way, went in circles
-or to and fro. At the speeds of the paper one that only took a long way around stays below."""
+LOOPING_PATHS = 3.0
+"""A robot that ran out of time and was not stuck, but moved more than so many times the shortest path, went in circles
+or to and fro. At the speeds of the paper one that only took a long path around stays below."""
 
 
 def name_late_end(stuck: bool, moved_m: float, shortest_m: float) -> str:
@@ -21,9 +21,9 @@ def name_late_end(stuck: bool, moved_m: float, shortest_m: float) -> str:
 
     Args:
         stuck: the robot no longer got anywhere; each simulator has its own way to see that.
-        moved_m: the way that it made [m].
-        shortest_m: the shortest way from start to goal [m].
+        moved_m: the path that it made [m].
+        shortest_m: the shortest path from start to goal [m].
     """
     if stuck:
         return STUCK
-    return LOOPING if moved_m > LOOPING_WAYS * shortest_m else TIMEOUT
+    return LOOPING if moved_m > LOOPING_PATHS * shortest_m else TIMEOUT

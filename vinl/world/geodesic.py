@@ -1,4 +1,4 @@
-"""Shortest ways over the free floor: distance fields and paths.
+"""Shortest paths over the free floor: distance fields and paths.
 
 Distances are those of a 32-neighbour grid: at most 1.4 % longer than the true ones in open space, never shorter than
 the straight line.
@@ -30,7 +30,7 @@ PATH_SPACING = 0.1
 def distance_field(
     traversable: Bool[np.ndarray, "rows columns"], frame: GridFrame, goal_xy: Float[np.ndarray, " 2"]
 ) -> Float[np.ndarray, "rows columns"]:
-    """Length of the shortest way to the goal from every cell.
+    """Length of the shortest path to the goal from every cell.
 
     Args:
         traversable: where the robot's middle may be.
@@ -51,7 +51,7 @@ def read_field(
     field: Float[np.ndarray, "rows columns"], frame: GridFrame, xy: Float[np.ndarray, "*n 2"]
 ) -> Float[np.ndarray, "*n"]:
     """Distance to the goal [m] at points [m] between the cells' centres: the best of the cells around each point, each
-    with the straight way to it added; infinite where no reachable cell is within two cells."""
+    with the straight line to it added; infinite where no reachable cell is within two cells."""
     xy = np.asarray(xy, dtype=np.float64)
     base = frame.cell(xy)
     best = np.full(xy.shape[:-1], np.inf)
@@ -71,7 +71,7 @@ def comfortable_path(
     goal_xy: Float[np.ndarray, " 2"],
     room: float = 0.5,
 ) -> Float[np.ndarray, "k 2"]:
-    """A way for a robot to follow: short, but through the middle of doors and away from walls where there is space.
+    """A path for a robot to follow: short, but through the middle of doors and away from walls where there is space.
 
     Floor with less clearance than ``room`` [m] costs up to five times its length, the nearer the wall the more.
 
@@ -85,7 +85,7 @@ def comfortable_path(
     cost = 1.0 + 4.0 * np.square(np.clip(1.0 - clearance / room, 0.0, 1.0))
     cheapest = _spread(traversable, goal, cost)
     if not np.isfinite(cheapest[start]):
-        raise InputError(f"no way leads from ({start_xy[0]:.2f}, {start_xy[1]:.2f}) to the goal")
+        raise InputError(f"no path leads from ({start_xy[0]:.2f}, {start_xy[1]:.2f}) to the goal")
     points = _resample(frame.xy(_descend(cheapest, start, cost)), frame.resolution)
     if len(points) > 2:
         smooth = gaussian_filter1d(points, 0.3 / frame.resolution / 2, axis=0, mode="nearest")
@@ -101,7 +101,7 @@ def path_length(path: Float[np.ndarray, "k 2"]) -> float:
 
 
 def _spread(mask: np.ndarray, origin: tuple[int, int], cost: np.ndarray | None = None) -> np.ndarray:
-    """Cost in cells of the cheapest way from the origin to each cell of the mask; a cell's own cost is at least 1.
+    """Cost in cells of the cheapest path from the origin to each cell of the mask; a cell's own cost is at least 1.
 
     Dijkstra's search, one band of width 1 at a time: no step is cheaper than 1, so a band settles in one go.
     """
@@ -130,7 +130,7 @@ def _spread(mask: np.ndarray, origin: tuple[int, int], cost: np.ndarray | None =
 
 
 def _descend(field: np.ndarray, start: tuple[int, int], cost: np.ndarray | None = None) -> np.ndarray:
-    """The cells of the cheapest way from the start to where the field (in cells) is zero, shape (k, 2)."""
+    """The cells of the cheapest path from the start to where the field (in cells) is zero, shape (k, 2)."""
     cells = [start]
     limit = np.array(field.shape)
     while field[cells[-1]] > 0:

@@ -13,7 +13,7 @@ from vinl.world.floorplan import ROOM_TO_STAND, FloorPlan
 from vinl.world.free_space import FIT_RADIUS, FreeSpace
 from vinl.world.geodesic import distance_field, read_field
 
-LEAST_WAY = 1.0
+LEAST_PATH = 1.0
 """A plan without two spots this far apart [m] is refused: the robot would arrive where it starts."""
 
 _MOST = 0.9
@@ -30,7 +30,7 @@ class StartGoal:
         start: shape (2,), start of the robot's middle [m].
         yaw: heading at the start [rad].
         goal: shape (2,), goal [m].
-        geodesic_m: shortest way over the free floor eroded by the robot's footprint [m].
+        geodesic_m: shortest path over the free floor eroded by the robot's footprint [m].
         straight_m: straight distance [m].
         note: why the distance or the clearance is less than was asked for, or that floor was left out or gaps are
             narrow; empty if all is well.
@@ -49,7 +49,7 @@ def sample_start_goals(
 ) -> list[StartGoal]:
     """Draw pairs of start and goal, both in one region that the robot really fits through.
 
-    The region is the largest that is connected for ``FIT_RADIUS``, so that no way leads only through a gap between
+    The region is the largest that is connected for ``FIT_RADIUS``, so that no path leads only through a gap between
     chairs that the robot would get stuck in. If that region is too small for the distance, but the largest one for
     the navigator's ``FOOTPRINT_RADIUS`` is not, the latter takes its place.
 
@@ -74,11 +74,11 @@ def sample_start_goals(
     widest = _measure_extent(spots)
     if widest < min_distance:
         more, more_notes = _find_spots(plan, space, clearance)
-        if _measure_extent(more) > max(widest, LEAST_WAY) + plan.frame.resolution:
+        if _measure_extent(more) > max(widest, LEAST_PATH) + plan.frame.resolution:
             gap = 2 * FIT_RADIUS
-            spots, notes = more, [*more_notes, f"some ways may lead through gaps narrower than {gap:.2f} m"]
+            spots, notes = more, [*more_notes, f"some paths may lead through gaps narrower than {gap:.2f} m"]
             widest = _measure_extent(spots)
-    if widest < min(LEAST_WAY, min_distance):
+    if widest < min(LEAST_PATH, min_distance):
         raise InputError(
             f"{plan.source}: the plan is too small for the robot: start and goal would be {widest:.1f} m apart; "
             "check its scale (metres per pixel)"
@@ -120,7 +120,7 @@ def shortest_distance(space: FreeSpace, start: Float[np.ndarray, "2"], goal: Flo
 
 
 def check_way(plan: FloorPlan) -> FloorPlan:
-    """The plan, if the robot has a way of ``LEAST_WAY`` to go in it.
+    """The plan, if the robot has a path of ``LEAST_PATH`` to go in it.
 
     Raises:
         InputError: if its free floor is in pieces, none of which is that long.
@@ -128,7 +128,7 @@ def check_way(plan: FloorPlan) -> FloorPlan:
     space = FreeSpace(plan)
     pieces = int(space.regions.max())
     longest = _measure_extent(plan.frame.xy(np.argwhere(space.regions == space.largest)))
-    if longest < LEAST_WAY:
+    if longest < LEAST_PATH:
         raise InputError(
             f"{plan.source}: a home without a path: the free floor of {plan.area_m2:.1f} m2 is in {pieces} pieces for "
             f"the robot, the largest {longest:.1f} m long; are doors missing, or is the scale wrong?"
@@ -144,10 +144,10 @@ def _find_spots(plan: FloorPlan, space: FreeSpace, clearance: float) -> tuple[Fl
     if len(cells) < 2:
         cells = np.argwhere(region & (space.clearance >= min(ROOM_TO_STAND, clearance)))
         notes.append(f"no clearance of {clearance:.2f} m, {ROOM_TO_STAND:.2f} m instead")
-    share = region.sum() / space.traversable.sum()
-    if share < _MOST:
+    fraction = region.sum() / space.traversable.sum()
+    if fraction < _MOST:
         gap = 2 * space.radius
-        notes.append(f"{1 - share:.0%} of the floor is left out: no way there is {gap:.2f} m wide")
+        notes.append(f"{1 - fraction:.0%} of the floor is left out: no path there is {gap:.2f} m wide")
     return plan.frame.xy(cells), notes
 
 

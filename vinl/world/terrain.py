@@ -43,7 +43,7 @@ class TerrainConfig:
         block_height: range of the blocks' heights [m] [paper IV-A: 0.1-0.2].
         tall_density: furniture-like tall boxes per m2 on ``blocks`` and ``walls`` tiles beyond the first level.
         start_clear: half-width of the square around the start without blocks [m].
-        wall_blocks: blocks on ``walls`` and ``rooms`` tiles, as a share of those on ``blocks`` tiles.
+        wall_blocks: blocks on ``walls`` and ``rooms`` tiles, as a fraction of those on ``blocks`` tiles.
         first_height: range of the blocks' heights up to the middle level [m], from which they grow evenly to
             ``block_height`` on the last; None: ``block_height`` on all levels.
         depth: of rings and bars, and of blocks up to 0.2 m, on the first level and from the middle one on [m]; between
@@ -77,9 +77,11 @@ class TerrainConfig:
     def __post_init__(self) -> None:
         if self.levels < 1 or self.columns < 1:
             raise InputError(f"terrain needs at least one level and column, got {self.levels} x {self.columns}")
-        shares = self.shares()
-        if min(shares.values()) < 0 or abs(sum(shares.values()) - 1) > 1e-6:
-            raise InputError(f"terrain: the shares of the tile types must add up to 1, got {sum(shares.values()):.3f}")
+        fractions = self.fractions()
+        if min(fractions.values()) < 0 or abs(sum(fractions.values()) - 1) > 1e-6:
+            raise InputError(
+                f"terrain: the fractions of the tile types must add up to 1, got {sum(fractions.values()):.3f}"
+            )
         if not 0 < self.block_height[0] <= self.block_height[1]:
             raise InputError(f"terrain: block_height must be a rising positive range, got {self.block_height}")
         if self.first_height is not None and not 0 < self.first_height[0] <= self.first_height[1]:
@@ -94,7 +96,7 @@ class TerrainConfig:
         if self.start_clear < 0:
             raise InputError("terrain: start_clear must not be negative")
 
-    def shares(self) -> dict[str, float]:
+    def fractions(self) -> dict[str, float]:
         """Share of every tile type, in the order of the columns."""
         flat = ("slope", "rough_slope", "stairs_up", "stairs_down", "discrete")
         return {name: getattr(self, name) for name in (*flat, "walls", "blocks", "rooms", "hurdles", "bars")}
@@ -114,9 +116,9 @@ class TerrainConfig:
 
     def column_kinds(self) -> list[str]:
         """The tile type of every column."""
-        edges = np.cumsum(list(self.shares().values()))
+        edges = np.cumsum(list(self.fractions().values()))
         middle = (np.arange(self.columns) + 0.5) / self.columns
-        return [list(self.shares())[k] for k in np.searchsorted(edges, middle)]
+        return [list(self.fractions())[k] for k in np.searchsorted(edges, middle)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,10 +282,10 @@ def _tile_blocks(
     level: int,
     middle: Float[np.ndarray, "2"],
     taken: Float[np.ndarray, "k 2"],
-    share: float = 1.0,
+    fraction: float = 1.0,
 ) -> Blocks:
-    """The blocks of a tile: none on the first level, ``share`` of the full density on the last, none at the start."""
-    wanted = share * config.block_density * TILE**2 * level / max(config.levels - 1, 1)
+    """The blocks of a tile: none on the first level, a ``fraction`` of all on the last, none at the start."""
+    wanted = fraction * config.block_density * TILE**2 * level / max(config.levels - 1, 1)
     clear = config.start_clear + 0.3  # half a block's diagonal more
     centres = scatter_centres(rng, round(wanted), TILE / 2, clear, 0.45, taken)
     blocks = draw_blocks(rng, centres, config.heights_at(level), min(config.depth_at(level), 0.2))

@@ -1,4 +1,4 @@
-"""What made-up homes are like."""
+"""What procedural homes are like."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ that one came in by; office floors."""
 
 @dataclass(frozen=True)
 class HomeConfig:
-    """Ranges and shares that homes are drawn from. Every range is (least, most), both included.
+    """Ranges and fractions that homes are drawn from. Every range is (least, most), both included.
 
     Attributes:
-        layout: one of ``LAYOUTS``; of an office the shares of corridors, wings, open plans and lofts are not read, and
-            homes with dead ends have no open plan, passage or second door.
+        layout: one of ``LAYOUTS``; of an office the fractions of corridors, wings, open plans and lofts are not
+            read, and homes with dead ends have no open plan, passage or second door.
         area: floor between the middle lines of the outer walls [m2]; small homes are drawn more often than large ones.
         door_width: clear width of doors [m].
         door_height: height of doors, below the lintel [m].
@@ -39,15 +39,15 @@ class HomeConfig:
         inner_wall: thickness of the walls between rooms, one for all of a home [m].
         outer_wall: thickness of the walls to the outside, at least that of the inner ones [m].
         corridor_width: width of a corridor between the middle lines of its walls [m].
-        corridor_share: share of homes whose rooms lie along a corridor; the others are split into rooms at random.
-        l_shape_share: share of homes of two wings.
-        open_plan_share: share of homes whose living room and kitchen, at times also the corridor, are one.
-        loft_share: share of homes that are one large room, with few small ones cut off.
-        passage_share: share of the doors to living rooms, kitchens and corridors that are open passages of 1.3 m to
+        corridor_share: fraction of homes whose rooms lie along a corridor; the others are split into rooms at random.
+        l_shape_share: fraction of homes of two wings.
+        open_plan_share: fraction of homes whose living room and kitchen, at times also the corridor, are one.
+        loft_share: fraction of homes that are one large room, with few small ones cut off.
+        passage_share: fraction of the doors to living rooms, kitchens and corridors that are open passages of 1.3 m to
             2.4 m.
         loop_share: probability of a second door where two of those rooms touch that are connected already.
         furniture_density: how full rooms are; 0 is bare, 1 as lived in, above 1 crowded.
-        bare_share: share of homes without furniture, walls only.
+        bare_share: fraction of homes without furniture, walls only.
         askew_share: probability that a piece of furniture stands turned or in the way instead of at its wall.
     """
 

@@ -23,7 +23,7 @@ IMPOSSIBLE = "homes: no home fits the config; widen its ranges (area, corridor_w
 
 
 def generate_home(seed: int, config: HomeConfig | None = None, resolution: float = RESOLUTION) -> FloorPlan:
-    """Make up a home: rooms, walls, doors, furniture. The same seed gives the same home.
+    """Generate a home: rooms, walls, doors, furniture. The same seed gives the same home.
 
     Every room can be reached by a robot of radius ``free_space.FIT_RADIUS``; furniture that would prevent it is left
     away.

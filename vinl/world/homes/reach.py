@@ -14,10 +14,10 @@ from vinl.world.homes.rooms import Rect, Room
 from vinl.world.raster import find_cells, label_regions, paint_boxes
 
 CHECKED_AT = 0.1
-"""Side of the cells that ways are checked on [m]. A way that is wide enough on these is wide enough on finer ones."""
+"""Side of the cells that paths are checked on [m]. A path that is wide enough on these is wide enough on finer ones."""
 
 CHECKED_RADIUS = 0.349
-"""Radius that ways are checked for on the coarse cells [m]. Straight gaps of seven cells pass, so every door does;
+"""Radius that paths are checked for on the coarse cells [m]. Straight gaps of seven cells pass, so every door does;
 between corners, of which the cells may miss the tips, it leaves room for ``free_space.FIT_RADIUS``."""
 
 POCKET = 0.25

@@ -62,8 +62,8 @@ class Columns:
     @property
     def tall(self) -> Bool[np.ndarray, "rows columns"]:
         """Cells under walls: surface in most layers from the floor up to ``WALL_FROM``."""
-        share: np.ndarray = self.layers[: _layer(WALL_FROM)].mean(0)  # type: ignore[assignment]
-        return share >= 0.8
+        fraction: np.ndarray = self.layers[: _layer(WALL_FROM)].mean(0)  # type: ignore[assignment]
+        return fraction >= 0.8
 
     def boxes(self) -> tuple[Boxes, Boxes]:
         """Walls and furniture as boxes that cover the cells exactly; what they shut in and is too small to stand in

@@ -90,10 +90,10 @@ def _check_box(box: Any, size: np.ndarray, source: str) -> None:
     """The file's own bounding box tells whether its outline is the whole one."""
     if not isinstance(box, dict) or "min" not in box or "max" not in box:
         return
-    told = np.array(box["max"], dtype=float)[:2] - np.array(box["min"], dtype=float)[:2]
-    if (np.abs(told - size) > 0.3 * np.maximum(told, size) + 1.0).any():
+    stated = np.array(box["max"], dtype=float)[:2] - np.array(box["min"], dtype=float)[:2]
+    if (np.abs(stated - size) > 0.3 * np.maximum(stated, size) + 1.0).any():
         raise InputError(
-            f"{source}: 'verts' span {size[0]:.1f} x {size[1]:.1f}, but 'bbox' says {told[0]:.1f} x {told[1]:.1f}; "
+            f"{source}: 'verts' span {size[0]:.1f} x {size[1]:.1f}, but 'bbox' says {stated[0]:.1f} x {stated[1]:.1f}; "
             "the outline is not the whole one, or in other units"
         )
 

@@ -51,7 +51,7 @@ def read_mesh_plan(file: Path, up: str | None, scale: float | None, wall_height:
 
     Raises:
         InputError: if the file is broken or holds no triangles, has no floor, is not in metres, or there is no room
-            or no way for the robot.
+            or no path for the robot.
     """
     vertices, faces = _load(file)
     size = vertices.max(0) - vertices.min(0)
