@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import tyro
 
-from vinl.benchmark.work import LARGEST
+from vinl.benchmark.protocol import LARGEST
 from vinl.chain.batching import BatchedPolicy, ask_only
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.depth_cameras import DepthCameras

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from vinl.benchmark.protocol import Row
 from vinl.benchmark.table_config import IDEAL, FaultMatrix
-from vinl.benchmark.work import Row
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.fault_config import FaultConfig
 from vinl.chain.navigators.oracle import OracleNavigator

@@ -10,10 +10,9 @@ import pytest
 
 from vinl.benchmark.evaluate import evaluate_rows
 from vinl.benchmark.journal import Journal, describe_differences, read_about, read_episodes, read_plans
-from vinl.benchmark.protocol import Protocol
-from vinl.benchmark.work import Row
+from vinl.benchmark.protocol import Protocol, Row
+from vinl.chain.choose import load_navigator
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.navigators.choose import load_navigator
 from vinl.chain.records import Results
 from vinl.config.errors import InputError
 from vinl.policies.policy import LocomotionPolicy

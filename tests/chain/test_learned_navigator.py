@@ -11,9 +11,9 @@ from tiny_networks import TinyGuide, TinyWalker
 
 from vinl.benchmark.evaluate import evaluate
 from vinl.chain.batching import find_safe_sizes
+from vinl.chain.choose import load_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.navigators.base import Task
-from vinl.chain.navigators.choose import load_navigator
 from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.chain.navigators.recovery import RecoveringNavigator
 from vinl.cli.app import main

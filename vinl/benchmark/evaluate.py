@@ -11,13 +11,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from vinl.benchmark.cluster import join_cluster
-from vinl.benchmark.protocol import Films, Protocol
+from vinl.benchmark.protocol import Films, Protocol, Row, Shared, cut_jobs, film_job, list_keys, longest_first, run_job
 from vinl.benchmark.store import Store
-from vinl.benchmark.work import Row, Shared, cut_jobs, film_job, list_keys, longest_first, run_job
-from vinl.chain.choose import check_cameras, check_locomotion_policy, choose_locomotor
+from vinl.chain.choose import check_cameras, check_locomotion_policy, choose_locomotor, choose_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.navigators.base import Navigator
-from vinl.chain.navigators.choose import choose_navigator
 from vinl.chain.progress_line import show_line
 from vinl.chain.records import Episode, Results
 from vinl.chain.workers import WorkerPool

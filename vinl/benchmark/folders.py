@@ -19,10 +19,10 @@ from vinl.benchmark.journal import (
     read_wall_seconds,
 )
 from vinl.benchmark.metrics import aggregate_episodes
+from vinl.benchmark.protocol import list_keys
 from vinl.benchmark.report import render_report, render_table_report
 from vinl.benchmark.table import TableRow, summarise_table
 from vinl.benchmark.table_config import PaperFigures, RowConfig, TableConfig
-from vinl.benchmark.work import list_keys
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.records import Results, plain_record
 from vinl.config.errors import InputError

@@ -5,9 +5,7 @@ A file holds 25 poses a second in about 1 kB: positions to the micrometre, angle
 
 from __future__ import annotations
 
-import os
 import re
-import tempfile
 import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -19,6 +17,7 @@ import numpy as np
 from vinl.benchmark.journal import RUN_FILE, read_about, read_episodes, read_plans
 from vinl.chain.records import Episode, EpisodeTrace, Key
 from vinl.config.errors import InputError
+from vinl.config.output import write_whole
 from vinl.world.floorplan import FloorPlan
 
 RECORDINGS = "recordings"
@@ -39,17 +38,9 @@ def write_recording(folder: Path, episode: Episode) -> Path:
     path, trace = find_recording(folder, episode.record.key), episode.trace
     parts = {name: trace.poses[:, columns] for name, columns in _COLUMNS.items()} | {"command": trace.commands}
     kinds = {name: np.float32 if name == "position" else np.float16 for name in parts}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, scratch = tempfile.mkstemp(prefix=f".{path.stem}-", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            arrays: dict[str, Any] = {name: part.astype(kinds[name]) for name, part in parts.items()}
-            np.savez_compressed(file, **arrays)
-        Path(scratch).chmod(0o644)
-        Path(scratch).replace(path)
-    except BaseException:
-        Path(scratch).unlink(missing_ok=True)
-        raise
+    arrays: dict[str, Any] = {name: part.astype(kinds[name]) for name, part in parts.items()}
+    with write_whole(path) as file:
+        np.savez_compressed(file, **arrays)
     return path
 
 

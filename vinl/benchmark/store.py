@@ -11,9 +11,8 @@ import numpy as np
 
 from vinl.benchmark.journal import Journal, read_wall_seconds
 from vinl.benchmark.metrics import aggregate_episodes
-from vinl.benchmark.protocol import Protocol
+from vinl.benchmark.protocol import Protocol, Row, missing_films
 from vinl.benchmark.recordings import forget_recordings, missing_recordings, without_poses, write_recording
-from vinl.benchmark.work import Row, missing_films
 from vinl.chain.navigators.base import ORACLE, Navigator
 from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.chain.navigators.oracle import OracleNavigator

@@ -1,4 +1,4 @@
-"""The locomotion policy that walks: the one that is named, or the best shipped one; and whether it fits the robot."""
+"""Who walks: the locomotion policy and the navigator of a name, or the shipped ones; and whether they fit the robot."""
 
 from __future__ import annotations
 
@@ -7,12 +7,18 @@ from typing import Any
 
 import numpy as np
 
+from vinl.chain.config import EvaluationConfig
+from vinl.chain.navigators.base import ORACLE, Navigator
+from vinl.chain.navigators.learned import LearnedNavigator
+from vinl.chain.navigators.oracle import OracleNavigator
+from vinl.chain.navigators.recovery import RecoveringNavigator
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.gait.observation import SENSED_TABLE
-from vinl.policies.card import find_detour, find_gait, locomotion_table
-from vinl.policies.io import list_policies, load_policy
+from vinl.policies.card import find_detour, find_gait, locomotion_table, read_card
+from vinl.policies.io import find_policy, list_policies, load_policy
 from vinl.policies.policy import Policy
+from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
 from vinl.robot.observation import PROPRIOCEPTION_SIZE
 
@@ -99,3 +105,59 @@ def check_locomotion_policy(policy: Policy) -> None:
         )
     if find_detour(card) is not None and card.observation_size == PROPRIOCEPTION_SIZE:
         raise InputError(f"policy {card.name}: commands are bent only for one that observes the height scan")
+
+
+NAVIGATOR = "nav"
+"""The navigator that comes with the package."""
+
+
+def choose_navigator(navigator: str | Path | Navigator | None, config: EvaluationConfig) -> Navigator:
+    """The navigator itself, the one of that name, or the shipped one; without one, the oracle.
+
+    Raises:
+        InputError: there is none of that name, it is a policy of another kind, or it is no navigator at all.
+    """
+    if navigator is None:
+        navigator = best_navigator()
+    if isinstance(navigator, (str, Path)):
+        return load_navigator(navigator, config)
+    if not all(hasattr(navigator, name) for name in ("reset", "act", "camera")):
+        raise InputError(
+            f"a navigator is a name, a folder, or has reset, act and camera; got {type(navigator).__name__} "
+            "(a function: vinl.as_navigator)"
+        )
+    return navigator
+
+
+def best_navigator() -> str:
+    """Name of the navigator that is taken where none is named."""
+    return NAVIGATOR if NAVIGATOR in list_policies() else ORACLE
+
+
+def load_navigator(
+    name: str | Path, config: EvaluationConfig, device: str = "cpu", recovery: bool = False
+) -> Navigator:
+    """The oracle, or a trained navigator.
+
+    Args:
+        name: ``"oracle"``, a shipped navigation policy's name, a policy folder or the folder of a training run.
+        config: how the oracle walks.
+        device: of a trained navigator.
+        recovery: free its robots where they are stuck (``RecoveringNavigator``); the oracle never has that.
+
+    Raises:
+        InputError: there is none of that name, or it is a policy of another kind.
+    """
+    if name == ORACLE:
+        if recovery:
+            raise InputError("recovery frees robots of a learned navigator; the oracle has none")
+        return OracleNavigator(config.oracle)
+    bare, shipped = str(name).removeprefix("vinl/"), list_policies()
+    if bare not in shipped and not Path(name).exists():
+        known = [ORACLE, *[policy for policy in shipped if read_card(find_policy(policy)).kind == "navigation"]]
+        raise InputError(
+            f"unknown navigator {str(name)!r}{closest(bare, known)}; known: {', '.join(known)}; or give a policy folder"
+        )
+    period = config.navigation_period * CONTROL_DT
+    learned = LearnedNavigator(load_policy(name, device), period)
+    return RecoveringNavigator(learned, period) if recovery else learned

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from vinl.benchmark.protocol import Protocol
-    from vinl.benchmark.work import Row
+    from vinl.benchmark.protocol import Protocol, Row
     from vinl.chain.config import EvaluationConfig
     from vinl.chain.records import Results
 
@@ -100,8 +99,7 @@ def main(argv: list[str]) -> int:
     from vinl.benchmark.folders import check_folder
     from vinl.benchmark.protocol import Films, Protocol
     from vinl.benchmark.routes import read_routes
-    from vinl.chain.choose import best_locomotor
-    from vinl.chain.navigators.choose import best_navigator
+    from vinl.chain.choose import best_locomotor, best_navigator
     from vinl.cli.kinds import check_config
     from vinl.config.output import check_out, strip_command
     from vinl.world.readers import load_floorplans
@@ -221,8 +219,7 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], com
 
 def _load_single(options: Options) -> Row:
     """Who walks without a table."""
-    from vinl.chain.choose import best_locomotor
-    from vinl.chain.navigators.choose import best_navigator
+    from vinl.chain.choose import best_locomotor, best_navigator
 
     loco, nav = options.loco or best_locomotor(), options.nav or best_navigator()
     obstacles = options.obstacles or "paper"
@@ -230,8 +227,8 @@ def _load_single(options: Options) -> Row:
 
 
 def _load_row(loco: str, nav: str, obstacles: str, recovery: bool, options: Options) -> Row:
-    from vinl.benchmark.work import Row
-    from vinl.chain.navigators.choose import load_navigator
+    from vinl.benchmark.protocol import Row
+    from vinl.chain.choose import load_navigator
     from vinl.policies.io import load_policy
 
     config = _load_rules(options)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import numbers
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from vinl.config.errors import InputError
 
@@ -66,18 +67,24 @@ def round_numbers(value: Any) -> Any:
     return round(float(value), 6) if is_float else value
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a file whole or not at all; an older one is replaced."""
+@contextlib.contextmanager
+def write_whole(path: Path) -> Iterator[IO[bytes]]:
+    """A file to write to that takes the place of an older one at the end of the context, whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, scratch = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
+        with os.fdopen(handle, "wb") as file:
+            yield file
         Path(scratch).chmod(0o644)
         Path(scratch).replace(path)
-    except BaseException:
+    finally:
         Path(scratch).unlink(missing_ok=True)
-        raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole or not at all; an older one is replaced."""
+    with write_whole(path) as file:
+        file.write(text.encode())
 
 
 def write_json(path: Path, data: dict[str, Any]) -> None:

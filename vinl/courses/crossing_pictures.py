@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import UInt8
-from PIL import Image, ImageDraw, ImageFont
 
 from vinl.courses.bars import WIDTH
 from vinl.courses.crossing import CrossingTrace
-from vinl.render.film_file import write_film
+from vinl.render.film_file import write_caption, write_film
 from vinl.render.raytrace import RayRenderer, look_at
 from vinl.render.robot_shape import RobotShape
 from vinl.render.scene import BLOCK, plain_scene
@@ -58,7 +57,6 @@ def draw_frames(
         RayRenderer(plain_scene(bar, [colour], floor, checker=0.25), shape.bodies, shape.names)
         for colour in (BLOCK, _TOUCHED)
     ]
-    font = ImageFont.load_default(18)
     shown = {name: _near_bar(trace) for name, trace in traces.items()}
     for k in range(0, max(map(len, shown.values())), every):
         rows = []
@@ -68,14 +66,12 @@ def draw_frames(
             pose = trace.qpos[step]
             view = look_at((pose[0] * 0.85, *_EYE), (pose[0] * 0.85, 0.0, _AIM))
             frame = renderers[int(touched)].render(view, *SIZE, *shape.place(pose), hfov=_FIELD)
-            picture = Image.fromarray(frame)
             feet, legs, trunk = (
                 int(flags[: step + 1].reshape(step + 1, -1).any(1).sum())
                 for flags in (trace.feet, trace.legs, trace.trunk)
             )
             text = f"{name}, {100 * height:g} cm    steps on the bar: feet {feet}, legs {legs}, trunk {trunk}"
-            ImageDraw.Draw(picture).text((12, 8), text, fill=(30, 30, 30), font=font)
-            rows.append(np.asarray(picture))
+            rows.append(write_caption(frame, text))
         yield np.concatenate(rows)
 
 

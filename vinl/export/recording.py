@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import torch
 
+from vinl.chain.choose import load_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_routes, draw_setups
 from vinl.chain.navigators.base import Navigator
-from vinl.chain.navigators.choose import load_navigator
 from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.chain.records import Episode
 from vinl.chain.rollout import InterruptedRunError, run_episodes

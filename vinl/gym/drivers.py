@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.chain.batching import batch_navigator, batch_policy
+from vinl.chain.choose import load_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.controller import open_controller
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.chain.navigators.base import Navigator, decide
-from vinl.chain.navigators.choose import load_navigator
 from vinl.gym.trip import Trip
 from vinl.policies.policy import Policy
 

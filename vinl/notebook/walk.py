@@ -11,12 +11,11 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from vinl.chain.choose import choose_locomotor
+from vinl.chain.choose import choose_locomotor, choose_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.depth_cameras import open_depth_cameras
 from vinl.chain.episode import draw_routes, draw_setup
 from vinl.chain.navigators.base import Navigator
-from vinl.chain.navigators.choose import choose_navigator
 from vinl.chain.progress_line import show_line
 from vinl.chain.records import Episode, EpisodeRecord, EpisodeTrace
 from vinl.chain.rollout import run_episodes

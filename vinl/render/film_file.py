@@ -7,7 +7,14 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import UInt8
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
+
+
+def write_caption(frame: UInt8[np.ndarray, "height width 3"], text: str) -> UInt8[np.ndarray, "height width 3"]:
+    """The picture with a line of text in its upper left corner."""
+    picture = Image.fromarray(frame)
+    ImageDraw.Draw(picture).text((12, 8), text, fill=(30, 30, 30), font=ImageFont.load_default(18))
+    return np.asarray(picture)
 
 
 def write_film(frames: Iterable[UInt8[np.ndarray, "height width 3"]], path: Path, rate: float) -> None:

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, UInt8
-from PIL import Image, ImageDraw, ImageFont
 
-from vinl.render.film_file import write_film
+from vinl.render.film_file import write_caption, write_film
 from vinl.render.raytrace import RayRenderer, look_at
 from vinl.render.robot_shape import RobotShape
 from vinl.render.scene import BLOCK, FLOOR, WALL, Scene
@@ -47,8 +46,7 @@ def draw_state_frames(
     poses: Float[np.ndarray, "t 19"], texts: list[str], field: HeightField
 ) -> Iterator[UInt8[np.ndarray, "height width 3"]]:
     """The pictures."""
-    shape, font = RobotShape(), ImageFont.load_default(18)
-    middle = poses[0, :3]
+    shape, middle = RobotShape(), poses[0, :3]
     renderer = RayRenderer(_cut_scene(field, middle[:2]), shape.bodies, shape.names)
     view = look_at(middle + np.array([1.1, -1.5, 0.7]), middle - np.array([0.0, 0.0, 0.1]))
     pose = poses[0]
@@ -57,9 +55,7 @@ def draw_state_frames(
         seen = np.isfinite(poses[row]).all() and np.abs(poses[row, :3] - middle).max() < 20
         pose = poses[row] if seen else pose
         frame = renderer.render(view, *SIZE, *shape.place(pose), hfov=math.radians(52))
-        picture = Image.fromarray(frame)
-        ImageDraw.Draw(picture).text((12, 8), texts[row], fill=(30, 30, 30), font=font)
-        yield np.asarray(picture)
+        yield write_caption(frame, texts[row])
 
 
 def _cut_scene(field: HeightField, middle: Float[np.ndarray, " 2"]) -> Scene:

@@ -11,13 +11,12 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from vinl.chain.choose import check_cameras, choose_locomotor
+from vinl.chain.choose import check_cameras, choose_locomotor, load_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.contacts import KINDS
 from vinl.chain.controller import open_controller
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.chain.navigators.base import Navigator, Task, decide
-from vinl.chain.navigators.choose import load_navigator
 from vinl.chain.robot import Robot
 from vinl.chain.scene import FORCE_SENSORS, build_scene
 from vinl.config.errors import InputError

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vinl.benchmark import work
-from vinl.benchmark.work import Row, cut_jobs, list_keys, longest_first, split_evenly
+from vinl.benchmark.protocol import LARGEST, Row, cut_jobs, list_keys, longest_first, split_evenly
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.policies.io import load_policy
 from vinl.world.floorplan import FloorPlan
@@ -40,5 +39,5 @@ def test_episodes_of_one_length_walk_together_and_the_longest_begin(two_rooms: F
     assert sorted(walked) == sorted(key[1:] for key in missing)
     assert [lengths[k] for _, k in walked] == sorted((lengths[k] for _, _, k in missing), reverse=True)
     assert [cell for job in jobs for cell in job.filmed] == [wanted[3][1:]]
-    assert max(len(job.cells) for job in jobs) <= work.LARGEST
+    assert max(len(job.cells) for job in jobs) <= LARGEST
     assert len(jobs) >= min(len(missing), 2 * workers)
