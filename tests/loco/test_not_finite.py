@@ -17,7 +17,7 @@ from vinl.loco.environment import LocoEnvironment
 from vinl.loco.lost import KEPT
 from vinl.loco.replay import LostState, load_lost, replay
 from vinl.loco.simulation import delay_steps
-from vinl.rl.not_finite import NotFiniteError, judge_losses
+from vinl.rl.nan_guard import NotFiniteError, judge_losses
 from vinl.rl.run_folder import MAX_LOST, RunFolder
 from vinl.robot.aliengo import DEFAULT_POSE
 

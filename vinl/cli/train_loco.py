@@ -81,7 +81,7 @@ def main(argv: list[str]) -> int:
     from vinl.config.loader import load_config
     from vinl.config.output import check_out
     from vinl.loco.config import LocoConfig
-    from vinl.rl.not_finite import NotFiniteError
+    from vinl.rl.nan_guard import NotFiniteError
     from vinl.rl.out_of_memory import explain_out_of_memory
     from vinl.rl.run_folder import RunFolder
 

@@ -14,7 +14,7 @@ import torch
 from torch.utils.tensorboard import SummaryWriter
 
 from vinl.config.errors import InputError
-from vinl.rl.not_finite import NotFiniteError, is_finite, judge_losses
+from vinl.rl.nan_guard import NotFiniteError, is_finite, judge_losses
 from vinl.rl.progress import TrainingProgress
 from vinl.rl.run_folder import RunFolder
 from vinl.rl.stopwatch import Stopwatch

@@ -1,4 +1,4 @@
-"""What a training does when numbers are not finite: a few robots are saved and forgotten, many end it."""
+"""The NaN guard of a training: a few robots whose numbers are not finite are saved and forgotten, many end it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class NotFiniteError(Exception):
 
 
 @runtime_checkable
-class LosingEnv(Protocol):
+class GuardedEnv(Protocol):
     """An environment that keeps the states before the steps that went wrong."""
 
     def take_lost(self) -> list[dict[str, Any]]:
@@ -46,7 +46,7 @@ def judge_losses(
     if not count:
         return None
     reasons: dict[str, int] = {}
-    if isinstance(env, LosingEnv):
+    if isinstance(env, GuardedEnv):
         for state in env.take_lost():
             folder.save_lost({**state, "iteration": iteration})
             reasons[state["reason"]] = reasons.get(state["reason"], 0) + 1
