@@ -25,7 +25,8 @@ class GaitConfig:
         edge: distance from a foot's surface to a block below which a foothold is forbidden [m].
         shank: distance from the axis of a shank to a block below which a foothold is forbidden [m].
         map: choose footholds on the map; False: Raibert's as they are, for policies that know no map.
-        modulate: largest change of a leg's rate, as a fraction: its foot meets a block better early or late.
+        modulate: largest change of a leg's rate while its foot stands, as a fraction: it meets a block better early or
+            late. Swings keep to the period: a leg that should swing slower than it is used to comes down too early.
     """
 
     stride: float = 0.48

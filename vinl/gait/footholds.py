@@ -21,7 +21,6 @@ from vinl.gait.state import (
     stance_places,
     stance_time,
     swings,
-    time_to_touch_down,
     turn,
 )
 from vinl.robot.aliengo import FOOT_RADIUS
@@ -153,7 +152,8 @@ RATES = 7
 TRACK = np.arange(-6, 25) * 0.055
 """(31,) places along each foot's track that are looked at, from its next foothold at the present rate [m]."""
 
-_STEPS = 2
+
+_STEPS = 3
 """How many footholds of each foot ahead its rate is chosen by."""
 
 _LEAST_SPEED = 0.15
@@ -162,7 +162,11 @@ _LEAST_SPEED = 0.15
 _RELAX = 0.2
 """Fraction of the way to the chosen rate that a leg's rate goes in a control step."""
 
-_APART = 0.12
+
+_RATE_COST = 1.0
+"""What the largest change of a rate costs."""
+
+_APART = 0.2
 """Phase by which a leg may leave the trot at a cost of 1."""
 
 _LEANS = (-0.165, 0.0, 0.165)
@@ -188,11 +192,36 @@ def _choose_rates(xp: Any, config: GaitConfig, gait: GaitState, command: Any, bl
     """(n, 4) the rates at which the next footholds of every foot ask for the smallest offsets.
 
     ``blocked`` (n, 4, 93) is what is in the way along the tracks; what a foothold would cost whose Raibert place is at
-    any of their places follows from it, and with that the cost of every rate. Legs that leave the trot are drawn back.
+    any of their places follows from it, and with that the cost of every rate, held for one stance. First a rate for all
+    legs together: they meet a bar in phase. Then one for each, which is drawn back to the trot.
     """
     if config.modulate == 0:
         return 0 * gait.rate + 1.0
-    left, speed = time_to_touch_down(xp, config, gait), _speed(xp, command)
+    speed, cost = _speed(xp, command), _cost_along_tracks(xp, blocked)
+    rates = constant(xp, np.linspace(1 - config.modulate, 1 + config.modulate, RATES, dtype=np.float32), speed)
+    period = gait.period[:, None, None]
+    stands = xp.where(swings(xp, config, gait), 0 * gait.phases, 1.0 - gait.phases)[..., None] * period
+    whole = stance_time(xp, config, gait)[:, None, None] * (1.0 / rates - 1.0)  # (n, 1, rates) gained by a whole stance
+    now = stands / gait.rate[..., None]
+    total = 0 * now + _RATE_COST * ((rates - 1) / config.modulate) ** 2
+    for k in range(_STEPS):
+        later = stands / rates - now if k == 0 else whole + stands - now + k * period
+        index = (later * speed[:, None, None] - float(TRACK[0])) / float(TRACK[1] - TRACK[0])
+        index = xp.clip(index, 0.0, len(TRACK) - 1.001)
+        below = xp.floor(index)
+        part, low = index - below, to_index(xp, below)
+        read = take_along(xp, cost, low, 2) * (1 - part) + take_along(xp, cost, low + 1, 2) * part
+        total = total + xp.clip(read, 0.0, 20.0)
+    together = xp.argmin(total.sum(1), -1)[:, None]
+    common = take_along(xp, whole[:, 0], together, 1)[..., None]
+    apart = unison(xp, gait.phases)[..., None] - (whole - common) / period
+    best = xp.take(rates, xp.argmin(total + (apart / _APART) ** 2, -1))
+    wanted = xp.where((speed > _LEAST_SPEED)[:, None], best, 1.0 + 0 * best)
+    return gait.rate + _RELAX * (wanted - gait.rate)
+
+
+def _cost_along_tracks(xp: Any, blocked: Any) -> Any:
+    """(n, 4, 31) what a foothold costs whose Raibert place is there: the best of those it can be moved to."""
     spread, long = len(ALONG) // 2, len(TRACK)
     by_lean = [blocked[..., k * long : (k + 1) * long] for k in range(len(_LEANS))]
     padded = [xp.concatenate([b[..., :1]] * spread + [b] + [b[..., -1:]] * spread, -1) for b in by_lean]
@@ -201,18 +230,4 @@ def _choose_rates(xp: Any, config: GaitConfig, gait: GaitState, command: Any, bl
         nearest = int(np.abs(np.array(_LEANS) - shift).argmin())
         window = padded[nearest][..., k : k + long] + float((shift / _WIDTH[0]) ** 2)
         cost = window if cost is None else xp.minimum(cost, window)
-
-    rates = constant(xp, np.linspace(1 - config.modulate, 1 + config.modulate, RATES, dtype=np.float32), left)
-    later = left[..., None] * gait.rate[..., None] / rates  # (n, 4, rates) until the foot comes down
-    apart = unison(xp, gait.phases)[..., None] + (rates - 1.0) * left[..., None] / gait.period[:, None, None]
-    total = 0.1 * ((rates - 1) / config.modulate) ** 2 + (apart / _APART) ** 2
-    for k in range(_STEPS):
-        at = (later + k * gait.period[:, None, None] - left[..., None]) * speed[:, None, None]
-        index = xp.clip((at - float(TRACK[0])) / float(TRACK[1] - TRACK[0]), 0.0, len(TRACK) - 1.001)
-        below = xp.floor(index)
-        part, low = index - below, to_index(xp, below)
-        read = take_along(xp, cost, low, 2) * (1 - part) + take_along(xp, cost, low + 1, 2) * part
-        total = total + xp.clip(read, 0.0, 20.0)
-    best = xp.take(rates, xp.argmin(total, -1))
-    wanted = xp.where((speed > _LEAST_SPEED)[:, None], best, 1.0 + 0 * best)
-    return gait.rate + _RELAX * (wanted - gait.rate)
+    return cost

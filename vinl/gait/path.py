@@ -18,14 +18,19 @@ _STEEP = 0.6
 
 GAIT_TERMS: tuple[tuple[str, int, float, str], ...] = (
     ("path_error", 12, 10.0, "m"),
+    ("path_ahead", 12, 5.0, "m"),
     ("foothold", 8, 3.0, "m"),
     ("apex", 4, 5.0, "m"),
     ("leg_phase", 8, 1.0, "sine, cosine"),
     ("swing", 4, 1.0, "1"),
+    ("rate", 4, 3.0, "1"),
 )
 """Name, size, scale and unit of what ``gait_rows`` gives, in its order: from each foot to the next point of its path
-(x, y, z), to its foothold (x, y) and to the height of its apex, all in the heading frame; its phase; whether it
-swings."""
+(x, y, z), to where the path is ``LOOK_AHEAD`` later, to its foothold (x, y) and to the height of its apex, all in the
+heading frame; its phase; whether it swings; how much faster than the others' its clock runs while it stands."""
+
+LOOK_AHEAD = 0.1
+"""Legs follow their targets so much later, latency included: a policy that sees only the next step is late [s]."""
 
 GAIT_SIZE = sum(size for _, size, _, _ in GAIT_TERMS)
 
@@ -37,20 +42,25 @@ def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: f
         xp: ``numpy``, ``jax.numpy`` or ``torch``.
         config, gait: of the robots.
         feet: (n, 4, 3) middles of the feet in the heading frame [m]; a foot that stands should be where it is.
-        later: how far ahead on the path to look [s].
+        later: how far ahead on the path to look [s]; past its touch-down a foot is at its foothold, and one that has
+            lifted off by then is on its way there from where it stands.
 
     Returns:
         (n, 4, 3) [m].
     """
     phases, fraction = gait.phases, swing_fraction(xp, config, gait.period)[:, None]
-    s = xp.clip((phases + later * gait.rate / gait.period[:, None]) / fraction, 0.0, 1.0)
+    swinging = phases < fraction
+    stands = xp.where(swinging, 0 * phases, (1.0 - phases) / gait.rate)  # in periods, until the foot lifts off
+    since = xp.where(swinging, phases, 0 * phases) + later / gait.period[:, None] - stands
+    s = xp.clip(since / fraction, 0.0, 1.0)
+    lift = xp.where(swinging[..., None], gait.lift, feet)
     forth = xp.clip((s - _WAIT) / (1 - 2 * _WAIT), 0.0, 1.0)
     forth = (0.5 - 0.5 * xp.cos(math.pi * forth))[..., None]
-    straight = gait.lift + (gait.target - gait.lift) * forth
+    straight = lift + (gait.target - lift) * forth
     bell = (xp.sin(math.pi * s) + 1e-6) ** _STEEP  # s = 1 gives a sine just below 0 in float32
     height = straight[..., 2] + (gait.apex - straight[..., 2]) * bell
     path = xp.concatenate([straight[..., :2], height[..., None]], -1)
-    return xp.where((phases < fraction)[..., None], path, feet)
+    return xp.where((since > 0)[..., None] | swinging[..., None], path, feet)
 
 
 def gait_rows(xp: Any, config: GaitConfig, gait: GaitState, feet: Any) -> Any:
@@ -67,9 +77,11 @@ def gait_rows(xp: Any, config: GaitConfig, gait: GaitState, feet: Any) -> Any:
     angle = 2 * math.pi * phases
     parts = [
         xp.clip(error, -0.5, 0.5).reshape(n, 12),
+        xp.clip(swing_path(xp, config, gait, feet, LOOK_AHEAD) - feet, -0.5, 0.5).reshape(n, 12),
         xp.clip((gait.target - feet)[..., :2], -1.0, 1.0).reshape(n, 8),
         xp.clip(apex, -0.5, 0.5),
         xp.stack([xp.sin(angle), xp.cos(angle)], -1).reshape(n, 8),
         xp.where(swinging, 1.0 + 0 * apex, 0 * apex),
+        gait.rate - 1.0,
     ]
     return xp.concatenate(parts, -1)

@@ -15,7 +15,7 @@ from vinl.gait.arrays import constant
 from vinl.gait.clock import OFFSETS, follow_period, is_moving, swing_fraction, wanted_period
 from vinl.gait.config import GaitConfig
 from vinl.robot.aliengo import CONTROL_DT
-from vinl.robot.kinematics import foot_positions
+from vinl.robot.kinematics import foot_positions, knee_positions
 from vinl.robot.rotation import wrap_angle, yaw_of
 
 START_PHASE = 0.95
@@ -31,7 +31,7 @@ class GaitState(NamedTuple):
     Attributes:
         phases: (n, 4) of the legs, in [0, 1): a foot's swing begins at 0.
         period: (n,) of the clock at rate 1 [s].
-        rate: (n, 4) how fast each leg's clock runs.
+        rate: (n, 4) how fast each leg's clock runs while its foot stands; swings keep to the period.
         lift: (n, 4, 3) where each foot last left the ground [m].
         target: (n, 4, 3) where it comes down next [m]; the middle of the foot.
         apex: (n, 4) height of its path's highest point [m].
@@ -73,7 +73,16 @@ def feet_in_heading_frame(xp: Any, qpos: Any) -> Any:
     """(n, 4, 3) middles of the feet in the heading frame [m], of robots at ``qpos`` (n, 19).
 
     Joint angles, roll and pitch are enough for it: place and heading are taken out again."""
-    here = foot_positions(xp, qpos) - qpos[:, None, :3]
+    return _in_heading_frame(xp, qpos, foot_positions(xp, qpos))
+
+
+def knees_in_heading_frame(xp: Any, qpos: Any) -> Any:
+    """(n, 4, 3) the knees, as ``feet_in_heading_frame``."""
+    return _in_heading_frame(xp, qpos, knee_positions(xp, qpos))
+
+
+def _in_heading_frame(xp: Any, qpos: Any, points: Any) -> Any:
+    here = points - qpos[:, None, :3]
     xy = turn(xp, -yaw_of(xp, qpos[:, 3:7])[:, None], here[..., :2])
     return xp.concatenate([xy, here[..., 2:]], -1)
 
@@ -122,7 +131,8 @@ def tick(xp: Any, config: GaitConfig, gait: GaitState, motion: Any, command: Any
     fraction = swing_fraction(xp, config, gait.period)[:, None]
     rests = ~is_moving(xp, command) & (gait.phases >= fraction).all(-1)
     period = follow_period(xp, config, gait.period, command)
-    ran = (gait.phases + CONTROL_DT * gait.rate / period[:, None]) % 1.0
+    pace = xp.where(gait.phases < fraction, 1.0 + 0 * gait.rate, gait.rate)
+    ran = (gait.phases + CONTROL_DT * pace / period[:, None]) % 1.0
     phases = xp.where(rests[:, None], gait.phases, ran)
     leaves = (phases < gait.phases)[..., None]  # has passed 1
     lift = xp.where(leaves, feet, carried(gait.lift))
@@ -147,8 +157,8 @@ def raibert(xp: Any, config: GaitConfig, gait: GaitState, velocity: Any, command
 def time_to_touch_down(xp: Any, config: GaitConfig, gait: GaitState) -> Any:
     """(n, 4) until each foot next comes down [s]."""
     phases, fraction = gait.phases, swing_fraction(xp, config, gait.period)[:, None]
-    in_clock = xp.where(phases < fraction, fraction - phases, 1.0 - phases + fraction)
-    return in_clock * gait.period[:, None] / gait.rate
+    in_clock = xp.where(phases < fraction, fraction - phases, (1.0 - phases) / gait.rate + fraction)
+    return in_clock * gait.period[:, None]
 
 
 def raibert_at(xp: Any, config: GaitConfig, gait: GaitState, moves: Any, command: Any, left: Any) -> tuple[Any, Any]:

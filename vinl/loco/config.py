@@ -31,8 +31,8 @@ class RewardConfig:
         vertical_velocity: vertical speed squared.
         roll_pitch_rate: squared rates of roll and pitch.
         orientation: squared tilt of the trunk.
-        base_height: squared error of the trunk's height over the feet that stand [m^2]; free near blocks, where the
-            legs need the room.
+        base_height: 1 - exp(-error^2 / (3 cm)^2) of the trunk's height over the feet that stand, against
+            ``gait.hip_height``: footholds are chosen for legs that hang from there.
         torque: squared joint torques.
         joint_acceleration: squared joint accelerations.
         joint_speed: squares of what joint speeds exceed 0.9 of the data sheet's by [(rad/s)^2].
@@ -45,6 +45,7 @@ class RewardConfig:
         collision: shanks and trunk that touch anything.
         obstacle_contact: feet that touch a block or wall.
         leg_contact: shanks that touch a block or wall (``collision`` counts them once more).
+        near_block: legs within 3 cm of a block or wall below the knee: 1 each at a touch, less farther away.
         leg_crossing: legs that touch each other.
         fall: one fall (not multiplied by the control step).
         sigma: width of the tracking terms [(m/s)^2].
@@ -68,6 +69,7 @@ class RewardConfig:
     collision: float = -1.0
     obstacle_contact: float = 0.0
     leg_contact: float = 0.0
+    near_block: float = 0.0
     leg_crossing: float = 0.0
     fall: float = 0.0
     sigma: float = 0.25

@@ -26,7 +26,6 @@ from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
 from vinl.robot.observation import CLIP, HEIGHT_SCAN, observe
 from vinl.robot.rotation import rotate_inverse
 from vinl.sensing.height_scan import scan_ground
-from vinl.world.clearance import FAR
 from vinl.world.endings import MAX_TILT
 from vinl.world.terrain import build_terrain
 
@@ -381,12 +380,11 @@ class LocoEnvironment:
         quaternion = body.qpos[:, 3:7]
         down = jnp.broadcast_to(jnp.array([0.0, 0.0, -1.0]), (self.num_envs, 3))
         gravity = rotate_inverse(jnp, quaternion, down)
-        near_block = self.simulation.block_distance(ground, body.qpos[:, :2]) < FAR
         return Motion(
             linear=rotate_inverse(jnp, quaternion, body.qvel[:, :3]),
             angular=body.qvel[:, 3:6],
             gravity=gravity,
-            height_error=jnp.where(near_block, 0.0, steps.height - self.config.gait.hip_height),
+            height_error=steps.height - self.config.gait.hip_height,
             joint_speed=body.qvel[:, 6:],
             last_joint_speed=old.body.qvel[:, 6:],
             torque=torque,
@@ -398,6 +396,7 @@ class LocoEnvironment:
             path_error=steps.path_error,
             swing=steps.swing,
             middle=steps.middle,
+            gap=steps.gap,
             blocked=steps.blocked,
             foot_speed=steps.speed,
             fallen=contacts.trunk_down | (gravity[:, 2] > _UPSIDE) | broken,

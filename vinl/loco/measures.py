@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from vinl.loco.config import RewardConfig
-from vinl.loco.rewards import Motion
+from vinl.loco.rewards import Motion, distance2
 from vinl.loco.simulation import FEET
 from vinl.robot.aliengo import CONTROL_DT, JOINT_SPEED_LIMIT
 from vinl.world.heightfield import BLOCK
@@ -91,7 +91,7 @@ def sum_measures(
         "crossing": m.contacts.crossing,
         "too_fast": (jnp.abs(m.joint_speed) > jnp.asarray(JOINT_SPEED_LIMIT, jnp.float32)).any(1),
         "swings": m.swing.sum(1),
-        "foot_error2": jnp.sum(m.path_error**2, (1, 2)),
+        "foot_error2": jnp.sum(distance2(m.path_error), 1),
         "swing_hits": (m.middle & m.contacts.foot).sum(1),
         "blocked": m.blocked.sum(1),
     }

@@ -24,13 +24,20 @@ MIDDLE = (0.2, 0.85)
 """Between these fractions of its swing a foot should touch nothing."""
 
 
+HEIGHT_WIDTH = 0.03
+"""A trunk so far from the height that footholds are chosen for has two thirds of its price [m]."""
+
+MARGIN = 0.03
+"""A leg nearer than this to a block costs [m]: contacts alone tell too late, and too seldom."""
+
+
 class Motion(NamedTuple):
     """What the terms are computed from; velocities in the trunk's frame.
 
     Attributes:
         linear, angular: (n, 3) velocity of the trunk [m/s, rad/s].
         gravity: (n, 3) unit vector down.
-        height_error: (n,) of the trunk over the feet that stand [m]; 0 near blocks.
+        height_error: (n,) of the trunk over the feet that stand [m].
         joint_speed, last_joint_speed: (n, 12) now and a control step ago [rad/s].
         torque: (n, 12) [N m].
         action, last_action: (n, 12).
@@ -39,6 +46,7 @@ class Motion(NamedTuple):
         landed: (n, 4) feet that touch down in this step.
         path_error: (n, 4, 3) from each foot to where its path has it [m]; 0 of feet that stand.
         swing, middle: (n, 4) which feet swing by the clock, and are in the middle of it.
+        gap: (n, 4) from each leg below the knee to the nearest block or wall [m].
         blocked: (n, 4) swinging feet whose foothold is on a block or beside it.
         foot_speed: (n, 4) of the feet along the ground [m/s].
         fallen: (n,).
@@ -59,9 +67,15 @@ class Motion(NamedTuple):
     path_error: Float[Array, "n 4 3"]
     swing: Bool[Array, "n 4"]
     middle: Bool[Array, "n 4"]
+    gap: Float[Array, "n 4"]
     blocked: Bool[Array, "n 4"]
     foot_speed: Float[Array, "n 4"]
     fallen: Bool[Array, " n"]
+
+
+def distance2(path_error: Float[Array, "n 4 3"]) -> Float[Array, "n 4"]:
+    """Squared distance of feet from their paths [m^2]; a foot may be higher than its path."""
+    return jnp.sum(path_error[..., :2] ** 2, -1) + jnp.maximum(path_error[..., 2], 0.0) ** 2
 
 
 def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"]]:
@@ -76,9 +90,8 @@ def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"
     """
     error2 = jnp.sum((m.command[:, :2] - m.linear[:, :2]) ** 2, 1)
     foot_hit, shank_hit = m.contacts.foot_block | m.contacts.foot_wall, m.contacts.shank_block | m.contacts.shank_wall
-    lack = jnp.maximum(m.path_error[..., 2], 0.0)  # a foot may be higher than its path
-    away2 = jnp.sum(m.path_error[..., :2] ** 2, -1) + lack**2
-    tracking = sum(weight * jnp.exp(-away2 / width) for weight, width in TRACKING)
+    lack = jnp.maximum(m.path_error[..., 2], 0.0)
+    tracking = sum(weight * jnp.exp(-distance2(m.path_error) / width) for weight, width in TRACKING)
     fast = jnp.maximum(jnp.abs(m.joint_speed) - jnp.asarray(FAST * JOINT_SPEED_LIMIT, jnp.float32), 0.0)
     slip = jnp.where(m.swing, 0.0, jnp.minimum(m.foot_speed, MAX_SLIP))
     return {
@@ -87,7 +100,7 @@ def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"
         "vertical_velocity": m.linear[:, 2] ** 2,
         "roll_pitch_rate": jnp.sum(m.angular[:, :2] ** 2, 1),
         "orientation": jnp.sum(m.gravity[:, :2] ** 2, 1),
-        "base_height": m.height_error**2,
+        "base_height": 1.0 - jnp.exp(-((m.height_error / HEIGHT_WIDTH) ** 2)),
         "torque": jnp.sum(m.torque**2, 1),
         "joint_acceleration": jnp.sum(((m.joint_speed - m.last_joint_speed) / CONTROL_DT) ** 2, 1),
         "joint_speed": jnp.sum(fast**2, 1),
@@ -99,6 +112,7 @@ def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"
         "collision": m.contacts.shank.sum(1) + m.contacts.trunk.astype(jnp.float32),
         "obstacle_contact": foot_hit.sum(1).astype(jnp.float32),
         "leg_contact": shank_hit.sum(1).astype(jnp.float32),
+        "near_block": jnp.sum(jnp.clip(1.0 - m.gap / MARGIN, 0.0, 1.0), 1),
         "leg_crossing": m.contacts.crossing.astype(jnp.float32),
         "fall": m.fallen / CONTROL_DT,
     }

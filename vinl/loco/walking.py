@@ -18,6 +18,7 @@ from vinl.gait.state import (
     Plan,
     aim,
     feet_in_heading_frame,
+    knees_in_heading_frame,
     motion_between,
     start_gait,
     swings,
@@ -25,9 +26,12 @@ from vinl.gait.state import (
     velocity_in_heading_frame,
 )
 from vinl.loco.rewards import MIDDLE
-from vinl.loco.simulation import Body, Ground
+from vinl.loco.simulation import SHANK_REACH, Body, Ground
 from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS
 from vinl.world.grid import GridFrame
+
+_ALONG_SHANK = (0.12, 0.25, 0.4, 0.6, 0.8)
+"""Places along a shank that are held against blocks, from the foot (0) to the knee (1)."""
 
 
 class Walk(NamedTuple):
@@ -48,6 +52,7 @@ class Steps(NamedTuple):
     Attributes:
         path_error: (n, 4, 3) from each foot to its path [m]; 0 of feet that stand.
         swing, middle: (n, 4) which feet swing, and are in the middle of it.
+        gap: (n, 4) from each leg below the knee to the nearest block or wall [m].
         blocked: (n, 4) swinging feet whose foothold is on a block or nearer to one than ``gait.edge``.
         speed: (n, 4) of the feet along the ground [m/s].
         height: (n,) of the trunk over the feet that stand [m].
@@ -56,6 +61,7 @@ class Steps(NamedTuple):
     path_error: Float[Array, "n 4 3"]
     swing: Bool[Array, "n 4"]
     middle: Bool[Array, "n 4"]
+    gap: Float[Array, "n 4"]
     blocked: Bool[Array, "n 4"]
     speed: Float[Array, "n 4"]
     height: Float[Array, " n"]
@@ -97,7 +103,6 @@ def go_on(
     progress = gait.phases / fraction
     stands = jnp.where(swing, 0.0, 1.0)
     below = jnp.sum(stands * feet[..., 2], 1) / jnp.maximum(stands.sum(1), 1.0)
-    gap = view.clearance(gait.target) - FOOT_RADIUS
     last = feet_in_heading_frame(jnp, before.qpos)
     turned = moved[:, None, 3:]
     carried = last[..., :2] - moved[:, None, :2]
@@ -107,11 +112,20 @@ def go_on(
         path_error=swing_path(jnp, config, gait, feet) - feet,
         swing=swing,
         middle=swing & (progress > MIDDLE[0]) & (progress < MIDDLE[1]),
-        blocked=swing & (gap < config.edge),
+        gap=_leg_gap(view, body, feet),
+        blocked=swing & (view.clearance(gait.target) - FOOT_RADIUS < config.edge),
         speed=jnp.hypot(feet[..., 0] - x, feet[..., 1] - y) / CONTROL_DT,
         height=FOOT_RADIUS - below,
     )
     return Walk(gait, plan), steps
+
+
+def _leg_gap(view: FieldView, body: Body, feet: Float[Array, "n 4 3"]) -> Float[Array, "n 4"]:
+    """How far foot and shank of each leg are from the nearest block or wall [m]."""
+    shank = knees_in_heading_frame(jnp, body.qpos)[:, :, None] - feet[:, :, None]
+    shank = feet[:, :, None] + shank * jnp.asarray(_ALONG_SHANK, jnp.float32)[:, None]
+    foot, axis = view.clearance(feet) - FOOT_RADIUS, view.clearance(shank).min(-1) - SHANK_REACH
+    return jnp.minimum(foot, axis)
 
 
 def local_heights(

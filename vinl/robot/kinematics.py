@@ -31,9 +31,19 @@ def foot_positions(xp: Any, qpos: Any) -> Any:
     Returns:
         (n, 4, 3) in the world [m], in the order of ``LEGS``.
     """
+    return _leg_points(xp, qpos, 1.0)
+
+
+def knee_positions(xp: Any, qpos: Any) -> Any:
+    """(n, 4, 3) the knees in the world [m]; arguments as for ``foot_positions``."""
+    return _leg_points(xp, qpos, 0.0)
+
+
+def _leg_points(xp: Any, qpos: Any, down: float) -> Any:
+    """Points along the shanks, from the knee (0) to the foot (1)."""
     hip, thigh, calf = (qpos[:, 7 + k :: 3] for k in range(3))
-    below = -LINK * (xp.cos(thigh) + xp.cos(thigh + calf))
-    ahead = -LINK * (xp.sin(thigh) + xp.sin(thigh + calf))
+    below = -LINK * (xp.cos(thigh) + down * xp.cos(thigh + calf))
+    ahead = -LINK * (xp.sin(thigh) + down * xp.sin(thigh + calf))
     aside = xp.asarray(THIGH_ASIDE, dtype=qpos.dtype)
     c, s = xp.cos(hip), xp.sin(hip)
     in_trunk = xp.stack([ahead, c * aside - s * below, s * aside + c * below], -1) + xp.asarray(HIPS, dtype=qpos.dtype)
