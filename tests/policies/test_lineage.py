@@ -3,7 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from vinl.policies.card import PolicyCard, locomotion_card
+from vinl.policies.commit import find_commit
 from vinl.policies.identity import digest_weights
 from vinl.policies.io import load_policy, save_policy
 from vinl.policies.lineage import trace_lineage
@@ -58,3 +61,8 @@ def test_shipped_digests_are_those_of_the_weights() -> None:
     for name in ("rough", "loco", "nav-blind"):
         policy = load_policy(name)
         assert policy.card.training["lineage"][-1]["weights_sha256"] == digest_weights(policy.network)
+
+
+def test_code_outside_its_repository_is_told_its_commit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VINL_COMMIT", "0123abc")
+    assert find_commit() == "0123abc"
