@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from vinl.benchmark import work
+from vinl.benchmark import protocol
 from vinl.benchmark.evaluate import evaluate
 from vinl.chain.batching import BatchedPolicy, batch_policy, is_steady
 from vinl.chain.config import EvaluationConfig
@@ -107,8 +107,8 @@ def test_episodes_do_not_depend_on_company(
     config = EvaluationConfig(time_limit=1.2)
     runs = []
     for size in (24, 2, 1):
-        monkeypatch.setattr(work, "LARGEST", size)
-        monkeypatch.setattr(work, "_PIECES", 1)
+        monkeypatch.setattr(protocol, "LARGEST", size)
+        monkeypatch.setattr(protocol, "_PIECES", 1)
         results = evaluate(
             [two_rooms], student, LearnedNavigator(guide), episodes=3, seeds=1, obstacles="paper", config=config
         )
