@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from vinl.benchmark.journal import (
 from vinl.benchmark.metrics import aggregate_episodes
 from vinl.benchmark.protocol import list_keys
 from vinl.benchmark.report import render_report, render_table_report
-from vinl.benchmark.table import TableRow, summarise_table
+from vinl.benchmark.table import Table, TableRow, summarise_table
 from vinl.benchmark.table_config import PaperFigures, RowConfig, TableConfig
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.records import Results, plain_record
@@ -41,21 +41,15 @@ def write_run(out: Path, results: Results, command: Sequence[str]) -> None:
     write_text(out / REPORT_FILE, render_report(results, shlex.join(command)))
 
 
-def write_table(
-    out: Path,
-    rows: Sequence[TableRow],
-    reference: str,
-    left_out: Mapping[str, str],
-    command: Sequence[str],
-) -> dict[str, Any]:
+def write_table(out: Path, table: Table) -> dict[str, Any]:
     """The files of every row in its folder, and the table's beside them.
 
     Returns:
         What the table's ``results.json`` holds.
     """
-    for row in rows:
-        write_run(out / row.name, row.results, row.command or command)
-    data = summarise_table(rows, reference, left_out, command)
+    for row in table.rows:
+        write_run(out / row.name, row.results, row.command or table.command)
+    data = summarise_table(table)
     write_json(out / RESULTS_FILE, data)
     write_text(out / REPORT_FILE, render_table_report(data))
     return data
@@ -141,27 +135,8 @@ def leave_out(table: TableConfig, strict: bool) -> tuple[dict[str, RowConfig], d
     return {name: row for name, row in table.rows.items() if name not in left_out}, left_out
 
 
-@dataclass(frozen=True, eq=False)
-class Combined:
-    """The rows of all folders.
-
-    Attributes:
-        rows: at least one.
-        is_table: whether a table is to be drawn.
-        reference: row that the others are compared with.
-        left_out: rows that no folder has, and why.
-        command: that walked the rows, or that puts rows of different commands together.
-    """
-
-    rows: list[TableRow]
-    is_table: bool
-    reference: str
-    left_out: dict[str, str] = field(default_factory=dict)
-    command: list[str] = field(default_factory=list)
-
-
-def read_folders(folders: Sequence[Path], out: Path, reference: str | None = None) -> Combined:
-    """Read folders whose episodes are the same.
+def read_folders(folders: Sequence[Path], out: Path, reference: str | None = None) -> tuple[Table, bool]:
+    """Rows of folders whose episodes are the same, and whether they make a table: one robot's folder does not.
 
     Args:
         folders: of ``vinl eval``, with or without ``--table``.
@@ -182,7 +157,7 @@ def read_folders(folders: Sequence[Path], out: Path, reference: str | None = Non
         ) from error
 
 
-def _read_folders(folders: Sequence[Path], out: Path, reference: str | None) -> Combined:
+def _read_folders(folders: Sequence[Path], out: Path, reference: str | None) -> tuple[Table, bool]:
     if not folders:
         raise InputError("vinl report needs at least one folder of vinl eval")
     if len({folder.resolve() for folder in folders}) < len(folders):
@@ -217,7 +192,7 @@ def _read_folders(folders: Sequence[Path], out: Path, reference: str | None) -> 
     left_out = {n: why for table in tables.values() for n, why in table["left_out"].items() if n not in names}
     same = len({tuple(row.command) for row in rows}) == 1
     command = list(rows[0].command) if same else ["vinl", "report", *map(str, folders)]
-    return Combined(rows, is_table, chosen, left_out, command)
+    return Table(rows, chosen, left_out, command), is_table
 
 
 def read_results(folder: Path, about: dict[str, Any], out: Path) -> Results:

@@ -36,31 +36,37 @@ class TableRow:
     command: Sequence[str] = ()
 
 
-def summarise_table(
-    rows: Sequence[TableRow],
-    reference: str,
-    left_out: Mapping[str, str],
-    command: Sequence[str],
-) -> dict[str, Any]:
-    """The table as plain data, without the episodes: small enough to be kept beside the code.
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Rows that were walked, side by side.
 
-    Args:
-        rows: in the order of the table.
-        reference: name of the row that the report compares with.
+    Attributes:
+        rows: at least one, in the order of the table.
+        reference: name of the row that the others are compared with.
         left_out: rows that were not walked, and why.
-        command: that made it.
+        command: that walked the rows, or that puts rows of different commands together.
     """
+
+    rows: Sequence[TableRow]
+    reference: str
+    left_out: Mapping[str, str]
+    command: Sequence[str]
+
+
+def summarise_table(table: Table) -> dict[str, Any]:
+    """The table as plain data, without the episodes: small enough to be kept beside the code."""
+    rows = table.rows
     config = {key: value for key, value in rows[0].results.config.items() if key != "obstacles"}
     min_metres = config["evaluation"]["min_metres"]
     return {
         "schema": SCHEMA,
-        "command": list(command),
+        "command": list(table.command),
         "config": config,
         "environment": describe_environment(),
         "plans": [{"name": plan.name, "area_m2": round(plan.area_m2, 2)} for plan in rows[0].results.plans],
-        "reference": reference,
+        "reference": table.reference,
         "rows": {row.name: _summarise_row(row, min_metres) for row in rows},
-        "left_out": dict(left_out),
+        "left_out": dict(table.left_out),
         "comparisons": [
             {
                 "one": a.name,

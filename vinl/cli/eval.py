@@ -188,7 +188,7 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], com
 
     from vinl.benchmark.folders import keep_table, leave_out, write_table
     from vinl.benchmark.report import print_table
-    from vinl.benchmark.table import TableRow
+    from vinl.benchmark.table import Table, TableRow
     from vinl.benchmark.table_config import TableConfig
     from vinl.config.loader import load_config
 
@@ -214,7 +214,7 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], com
         TableRow(name, row.title, results, row.paper)
         for (name, row), results in zip(present.items(), done, strict=True)
     ]
-    print_table(console, write_table(out, rows, reference, left_out, command), out)
+    print_table(console, write_table(out, Table(rows, reference, left_out, command)), out)
 
 
 def _load_single(options: Options) -> Row:

@@ -33,14 +33,12 @@ def main(argv: list[str]) -> int:
     from vinl.benchmark.report import print_summary, print_table
     from vinl.config.output import check_out
 
-    out, console = (
-        check_out(options.out or (options.folders[0] if len(options.folders) == 1 else "runs/report")),
-        Console(),
-    )
-    found = read_folders([Path(folder) for folder in options.folders], out, options.reference)
-    if found.is_table:
-        print_table(console, write_table(out, found.rows, found.reference, found.left_out, found.command), out)
+    out = check_out(options.out or (options.folders[0] if len(options.folders) == 1 else "runs/report"))
+    console = Console()
+    table, is_table = read_folders([Path(folder) for folder in options.folders], out, options.reference)
+    if is_table:
+        print_table(console, write_table(out, table), out)
     else:
-        write_run(out, found.rows[0].results, found.command)
-        print_summary(console, found.rows[0].results, out)
+        write_run(out, table.rows[0].results, table.command)
+        print_summary(console, table.rows[0].results, out)
     return 0

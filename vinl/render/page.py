@@ -26,7 +26,7 @@ def render_page(template: str, filters: Mapping[str, Callable[..., Any]], **valu
 
 def open_table(first: str, columns: Iterable[str], **options: Any) -> Table:
     """A table for the terminal: names on the left, then columns of numbers."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, **options)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True, **options)
     table.add_column(first, overflow="fold", min_width=9)
     for title in columns:
         table.add_column(title, justify="right", no_wrap=True)

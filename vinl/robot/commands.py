@@ -60,7 +60,7 @@ def make_commands(
         xp: ``numpy`` or ``jax.numpy``.
         config: the ranges.
         drawn: (..., 5) in the order of ``UNIFORM``.
-        hold_step: the time until the next command is rounded to multiples of this [s].
+        hold_step: the time until the next command is rounded to multiples of this [s], itself one of ``CONTROL_DT``.
 
     Returns:
         (..., 3) forward, left [m/s] and yaw rate [rad/s]; (...) control steps until the next command.
@@ -71,6 +71,6 @@ def make_commands(
     still = (xp.hypot(forward, left) < config.min_speed) | (kind < config.stand_share + config.turn_share)
     turn = xp.where(kind < config.stand_share, 0.0, turn)
     low, high = config.hold
-    held = xp.maximum(xp.round((low + (high - low) * drawn[..., -1]) / hold_step), 1) * hold_step
+    held = xp.maximum(xp.round((low + (high - low) * drawn[..., -1]) / hold_step), 1) * round(hold_step / CONTROL_DT)
     command = xp.stack([xp.where(still, 0.0, forward), xp.where(still, 0.0, left), turn], -1)
-    return command, xp.maximum(xp.round(held / CONTROL_DT), 1).astype(xp.int32)
+    return command, held.astype(xp.int32)
