@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vinl.benchmark.protocol import LARGEST, Row, cut_jobs, list_keys, longest_first, split_evenly
+from vinl.benchmark.protocol import LARGEST, Row, cut_jobs, each_key, longest_first, split_evenly
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.policies.io import load_policy
 from vinl.world.floorplan import FloorPlan
@@ -32,7 +32,7 @@ def route(length: float) -> StartGoal:
 def test_episodes_of_one_length_walk_together_and_the_longest_begin(two_rooms: FloorPlan, workers: int) -> None:
     lengths = [5.0, 12.0, 7.0, 9.0, 20.0, 6.0, 15.0, 8.0]
     routes, row = [[route(length) for length in lengths]], Row(load_policy("rough"), OracleNavigator())
-    wanted = list_keys([two_rooms], len(lengths), range(5))
+    wanted = list(each_key([two_rooms], len(lengths), range(5)))
     missing = [key for key in wanted if key != (two_rooms.name, 1, 4)]
     jobs = longest_first(cut_jobs(0, row, [two_rooms], routes, wanted, missing, {wanted[3]}, workers), routes)
     walked = [cell for job in jobs for cell in job.cells]

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from vinl.benchmark.cluster import join_cluster
-from vinl.benchmark.protocol import Films, Protocol, Row, Shared, cut_jobs, film_job, list_keys, longest_first, run_job
+from vinl.benchmark.protocol import Films, Protocol, Row, Shared, cut_jobs, each_key, film_job, longest_first, run_job
 from vinl.benchmark.store import Store
 from vinl.chain.choose import check_cameras, check_locomotion_policy, choose_locomotor, choose_navigator
 from vinl.chain.config import EvaluationConfig
@@ -134,7 +134,7 @@ def evaluate_rows(
         for k, plan in enumerate(protocol.plans):
             on_progress("plan", k, len(protocol.plans))
             routes.append(protocol.find_routes(plan))
-        wanted = list_keys(protocol.plans, protocol.episodes, protocol.seeds)
+        wanted = list(each_key(protocol.plans, protocol.episodes, protocol.seeds))
         stores = [
             stack.enter_context(contextlib.closing(Store(row, protocol, folder, keep, fresh, command)))
             for row, folder in zip(rows, where, strict=True)

@@ -6,6 +6,7 @@ import json
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from vinl.benchmark.journal import (
     read_wall_seconds,
 )
 from vinl.benchmark.metrics import aggregate_episodes
-from vinl.benchmark.protocol import list_keys
+from vinl.benchmark.protocol import each_key
 from vinl.benchmark.report import render_report, render_table_report
 from vinl.benchmark.table import Table, TableRow, summarise_table
 from vinl.benchmark.table_config import PaperFigures, RowConfig, TableConfig
@@ -206,22 +207,25 @@ def read_results(folder: Path, about: dict[str, Any], out: Path) -> Results:
     Raises:
         InputError: episodes are missing.
     """
-    plans, seeds = read_plans(folder, about), about["config"]["seeds"]
-    wanted = list_keys(plans, about["config"]["episodes_per_plan"], range(seeds[0], seeds[-1] + 1))
+    plans, config = read_plans(folder, about), about["config"]
+    seeds = range(config["seeds"][0], config["seeds"][-1] + 1)
     done = {episode.record.key: episode for episode in read_episodes(folder)}
-    missing = [key for key in wanted if key not in done]
-    if missing:
-        plan, seed, episode = missing[0]
+    # a damaged run.json may ask for millions: no more are looked for than there are
+    wanted = list(islice(each_key(plans, config["episodes_per_plan"], seeds), len(done) + 1))
+    lost = next((key for key in wanted if key not in done), None)
+    if lost is not None:
+        total = len(plans) * len(seeds) * config["episodes_per_plan"]
+        plan, seed, episode = lost
         raise InputError(
-            f"{folder}: {len(missing)} of {len(wanted)} episodes are missing, the first is episode {episode} of seed "
+            f"{folder}: {total - len(done)} of {total} episodes are missing, the first is episode {episode} of seed "
             f"{seed} in {plan}: the run was interrupted, start its command again"
         )
-    config = build_config(EvaluationConfig, about["config"]["evaluation"], source=str(folder / RUN_FILE))
+    rules = build_config(EvaluationConfig, config["evaluation"], source=str(folder / RUN_FILE))
     episodes = [done[key] for key in wanted]
-    aggregate = aggregate_episodes([e.record for e in episodes], config.min_metres)
+    aggregate = aggregate_episodes([e.record for e in episodes], rules.min_metres)
     films = [name for key in wanted if (out / (name := name_film(*key))).exists()]
     wall = read_wall_seconds(folder)
-    return Results(episodes, aggregate, plans, about["policies"], about["config"], wall, films)
+    return Results(episodes, aggregate, plans, about["policies"], config, wall, films)
 
 
 def _check_rules(abouts: dict[Path, dict[str, Any]]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -116,9 +116,9 @@ class Job:
     at_once: bool = False
 
 
-def list_keys(plans: Sequence[FloorPlan], episodes: int, seeds: range) -> list[Key]:
+def each_key(plans: Sequence[FloorPlan], episodes: int, seeds: range) -> Iterator[Key]:
     """All episodes of a row in the order of the results."""
-    return [(plan.name, seed, k) for plan in plans for seed in seeds for k in range(episodes)]
+    return ((plan.name, seed, k) for plan in plans for seed in seeds for k in range(episodes))
 
 
 def cut_jobs(

@@ -25,6 +25,9 @@ MARGIN = 0.5
 MAX_CELLS = 9_000_000
 """More cells than this (a square of 150 m) is taken for a wrong scale."""
 
+LONGEST = 400.0
+"""So is a plan that is longer than this [m], however narrow."""
+
 
 ROOM_TO_STAND = 0.4
 """Half the robot's diagonal [m]: a spot with this clearance lets it stand and turn (0.70 m x 0.38 m)."""
@@ -105,11 +108,12 @@ def frame_around(
         )
     first = np.floor((low - MARGIN) / resolution)
     cells = np.ceil((high + MARGIN) / resolution) - first
-    if cells.prod() > MAX_CELLS:
-        size, side = high - low, np.sqrt(MAX_CELLS) * resolution
+    size = high - low
+    if cells.prod() > MAX_CELLS or size.max() > LONGEST:
+        most = f"a square of {np.sqrt(MAX_CELLS) * resolution:.0f} m, or {LONGEST:g} m in length"
         raise InputError(
-            f"{source}: the plan would be {size[0]:.4g} m x {size[1]:.4g} m, more than a square of {side:.0f} m; check "
-            "its scale (metres per pixel)"
+            f"{source}: the plan would be {size[0]:.4g} m x {size[1]:.4g} m, more than {most}; check its scale (metres "
+            "per pixel)"
         )
     x0, y0 = (first + 0.5) * resolution
     return GridFrame(float(x0), float(y0), resolution, (int(cells[1]), int(cells[0])))
