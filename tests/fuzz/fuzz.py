@@ -30,7 +30,7 @@ from corpus import Reader, make_readers
 
 from vinl.config.errors import InputError
 
-FILES = 1000
+FILES = 800
 """Damaged files of each kind."""
 
 SECONDS = 5.0

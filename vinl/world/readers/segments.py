@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
 
 Point = tuple[float, float]
@@ -23,6 +25,9 @@ class Wall:
     thickness: float
     height: float
 
+    def __post_init__(self) -> None:
+        _check_finite("wall", *self.start, *self.end, self.thickness, self.height)
+
 
 @dataclass(frozen=True)
 class Opening:
@@ -31,6 +36,14 @@ class Opening:
     start: Point
     end: Point
     height: float
+
+    def __post_init__(self) -> None:
+        _check_finite("opening", *self.start, *self.end, self.height)
+
+
+def _check_finite(what: str, *numbers: float) -> None:
+    if not all(map(math.isfinite, numbers)):
+        raise InputError(f"a {what} has a number that is not finite")
 
 
 def box_along(
