@@ -21,6 +21,8 @@ class GaitConfig:
         stance: where the feet stand under the standing trunk, from its middle, forward and aside [m].
         hip_height: of the hips above the ground that the planner reckons with [m]: the lower, the farther the feet
             reach and the farther back the shanks lean.
+        highest_hip: how far the hips rise while a leg swings over something high [m]: where the thigh hangs straight
+            down, the knee would pass through it.
         lift: height of the swing path's apex over what lies below it [m].
         edge: distance from a foot's surface to a block below which a foothold is forbidden [m].
         shank: distance from the axis of a shank to a block below which a foothold is forbidden [m].
@@ -30,11 +32,12 @@ class GaitConfig:
     """
 
     stride: float = 0.48
-    period: tuple[float, float] = (0.6, 1.2)
-    swing_time: float = 0.6
+    period: tuple[float, float] = (0.6, 1.4)
+    swing_time: float = 0.45
     swing_fraction: float = 0.45
     stance: tuple[float, float] = (0.24, 0.15)
     hip_height: float = 0.43
+    highest_hip: float = 0.47
     lift: float = 0.08
     edge: float = 0.035
     shank: float = 0.03
@@ -52,6 +55,8 @@ class GaitConfig:
             raise InputError(f"gait.swing_fraction must lie in (0, 0.5]: two feet stand, got {self.swing_fraction}")
         if not 2 * FOOT_RADIUS < self.hip_height < 0.5:
             raise InputError(f"gait.hip_height must lie between {2 * FOOT_RADIUS} and 0.5 m, got {self.hip_height}")
+        if not self.hip_height <= self.highest_hip < 0.5:
+            raise InputError(f"gait.highest_hip must lie between hip_height and 0.5 m, got {self.highest_hip}")
         if min(self.edge, self.shank) < 0:
             raise InputError("gait.edge and gait.shank must not be negative")
         if not 0 <= self.modulate < 1:

@@ -95,7 +95,7 @@ def plan_footholds(
     way = start[..., None, :2] + (chosen - start[..., :2])[..., None, :] * constant(xp, PATH, level)[:, None]
     over = xp.amax(view.crest(way), -1) + FOOT_RADIUS - base
     apex = xp.maximum(over, xp.clip(rise, 0.0, None)) + config.lift
-    return Plan(offset, rise, apex, _choose_rates(xp, config, gait, command, blocked))
+    return Plan(offset, rise, apex, _choose_rates(xp, config, gait, command, feet, blocked))
 
 
 def obstruction(
@@ -126,7 +126,7 @@ def obstruction(
     stance = constant(xp, stance_places(config)[:, 0] - HIPS[:, 0].astype(np.float32), along)
     touch_down = (stance + sweep[:, None] / 2)[..., None] + along
     ahead = xp.stack([touch_down, touch_down - sweep[:, None, None]], -1)  # (n, 4, k, 2)
-    hip = config.hip_height - FOOT_RADIUS
+    hip = (gait.hip - FOOT_RADIUS)[:, None, None, None]
     back, up = knee_from_foot(xp, ahead, hip + 0 * ahead)
     parts = constant(xp, np.array(SHANK_FRACTIONS, np.float32), along)
     back, up = ((x[..., None] * parts).reshape(*x.shape[:-1], 2 * len(SHANK_FRACTIONS)) for x in (back, up))
@@ -135,7 +135,7 @@ def obstruction(
     foot = xp.concatenate([points, ground[..., None]], -1)[..., None, :]
     gap = view.clearance(xp.concatenate([foot, leg], -2))
     short = xp.amax(config.shank - gap[..., 1:], -1)
-    too_far = xp.clip(xp.abs(ahead) - farthest(xp, 0 * along[0] + hip), 0.0, None).sum(-1)
+    too_far = xp.clip(xp.abs(ahead) - farthest(xp, hip), 0.0, None).sum(-1)
     touches = _price(xp, FOOT_RADIUS + config.edge - gap[..., 0], 0) + _price(xp, short, 1)
     return touches + _OUT_OF_REACH * too_far
 
@@ -188,7 +188,7 @@ def _speed(xp: Any, command: Any) -> Any:
     return xp.sqrt(command[:, 0] ** 2 + command[:, 1] ** 2)
 
 
-def _choose_rates(xp: Any, config: GaitConfig, gait: GaitState, command: Any, blocked: Any) -> Any:
+def _choose_rates(xp: Any, config: GaitConfig, gait: GaitState, command: Any, feet: Any, blocked: Any) -> Any:
     """(n, 4) the rates at which the next footholds of every foot ask for the smallest offsets.
 
     ``blocked`` (n, 4, 93) is what is in the way along the tracks; what a foothold would cost whose Raibert place is at
@@ -212,6 +212,10 @@ def _choose_rates(xp: Any, config: GaitConfig, gait: GaitState, command: Any, bl
         part, low = index - below, to_index(xp, below)
         read = take_along(xp, cost, low, 2) * (1 - part) + take_along(xp, cost, low + 1, 2) * part
         total = total + xp.clip(read, 0.0, 20.0)
+    hips = constant(xp, HIPS[:, 0].astype(np.float32), feet)
+    room = feet[..., 0] - hips + farthest(xp, gait.hip - FOOT_RADIUS)[:, None]
+    lack = xp.clip(command[:, 0, None, None] * stands / rates - room[..., None], 0.0, None)
+    total = total + xp.where(stands > 0, _OUT_OF_REACH * lack, 0.0)
     together = xp.argmin(total.sum(1), -1)[:, None]
     common = take_along(xp, whole[:, 0], together, 1)[..., None]
     apart = unison(xp, gait.phases)[..., None] - (whole - common) / period

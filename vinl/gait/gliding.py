@@ -47,15 +47,16 @@ def glide(config: GaitConfig, height: float, speed: float, robots: int, depth: f
     gait = start_gait(np, config, feet)
     foot, shank, in_reach = np.zeros(n, bool), np.zeros(n, bool), np.ones(n, bool)
     for _ in range(round(4.0 / speed / CONTROL_DT)):
-        qpos[:, :1] += motion[:, :1]
-        feet[..., 0] -= motion[:, :1]
+        qpos[:, :3] += motion[:, :3]
+        feet -= motion[:, None, :3]
         gait = tick(np, config, gait, motion, command, feet)
         view = FieldView(np, ground, frame, qpos)
         gait = aim(
             np, config, gait, plan_footholds(np, config, view, gait, velocity, command, feet), velocity, command, feet
         )
         feet = swing_path(np, config, gait, feet)
-        feet[..., 2] = np.where(swings(np, config, gait), feet[..., 2], FOOT_RADIUS - z)
+        motion[:, 2] = gait.hip - qpos[:, 2]
+        feet[..., 2] = np.where(swings(np, config, gait), feet[..., 2], FOOT_RADIUS - qpos[:, 2:3])
         ahead = feet[..., 0] - HIPS[:, 0]
         near = np.abs(qpos[:, 0]) < 1.1
         in_reach &= ~near | (np.hypot(ahead, feet[..., 2]) < _LONGEST).all(1)

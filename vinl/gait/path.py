@@ -24,10 +24,12 @@ GAIT_TERMS: tuple[tuple[str, int, float, str], ...] = (
     ("leg_phase", 8, 1.0, "sine, cosine"),
     ("swing", 4, 1.0, "1"),
     ("rate", 4, 3.0, "1"),
+    ("hip", 1, 20.0, "m"),
 )
 """Name, size, scale and unit of what ``gait_rows`` gives, in its order: from each foot to the next point of its path
 (x, y, z), to where the path is ``LOOK_AHEAD`` later, to its foothold (x, y) and to the height of its apex, all in the
-heading frame; its phase; whether it swings; how much faster than the others' its clock runs while it stands."""
+heading frame; its phase; whether it swings; how much faster its clock runs while it
+stands; and how far the hips should rise above their usual height."""
 
 LOOK_AHEAD = 0.1
 """Legs follow their targets so much later, latency included: a policy that sees only the next step is late [s]."""
@@ -83,5 +85,6 @@ def gait_rows(xp: Any, config: GaitConfig, gait: GaitState, feet: Any) -> Any:
         xp.stack([xp.sin(angle), xp.cos(angle)], -1).reshape(n, 8),
         xp.where(swinging, 1.0 + 0 * apex, 0 * apex),
         gait.rate - 1.0,
+        (gait.hip - config.hip_height)[:, None],
     ]
     return xp.concatenate(parts, -1)

@@ -15,7 +15,7 @@ from vinl.gait.arrays import constant
 from vinl.gait.clock import OFFSETS, follow_period, is_moving, swing_fraction, wanted_period
 from vinl.gait.config import GaitConfig
 from vinl.robot.aliengo import CONTROL_DT
-from vinl.robot.kinematics import foot_positions, knee_positions
+from vinl.robot.kinematics import LINK, foot_positions, knee_positions
 from vinl.robot.rotation import wrap_angle, yaw_of
 
 START_PHASE = 0.95
@@ -23,6 +23,13 @@ START_PHASE = 0.95
 
 FREEZE = 0.75
 """A foot that has swung for this fraction of its swing comes down where it was going."""
+
+
+_RISE = 0.12
+"""Time constant with which the trunk rises and sinks [s]."""
+
+_OVER = 0.05
+"""A knee under the hip passes this far above a block [m]."""
 
 
 class GaitState(NamedTuple):
@@ -35,6 +42,7 @@ class GaitState(NamedTuple):
         lift: (n, 4, 3) where each foot last left the ground [m].
         target: (n, 4, 3) where it comes down next [m]; the middle of the foot.
         apex: (n, 4) height of its path's highest point [m].
+        hip: (n,) how high above the ground the hips should be [m].
     """
 
     phases: Any
@@ -43,6 +51,7 @@ class GaitState(NamedTuple):
     lift: Any
     target: Any
     apex: Any
+    hip: Any
 
 
 class Plan(NamedTuple):
@@ -66,7 +75,9 @@ def start_gait(xp: Any, config: GaitConfig, feet: Any) -> GaitState:
     still = 0 * feet[..., 0]
     period = wanted_period(xp, config, still[:, :3])
     phases = (START_PHASE + constant(xp, OFFSETS, feet) + still) % 1.0
-    return GaitState(phases, period, still + 1.0, feet, feet, feet[..., 2] + config.lift)
+    return GaitState(
+        phases, period, still + 1.0, feet, feet, feet[..., 2] + config.lift, period * 0 + config.hip_height
+    )
 
 
 def feet_in_heading_frame(xp: Any, qpos: Any) -> Any:
@@ -136,7 +147,7 @@ def tick(xp: Any, config: GaitConfig, gait: GaitState, motion: Any, command: Any
     phases = xp.where(rests[:, None], gait.phases, ran)
     leaves = (phases < gait.phases)[..., None]  # has passed 1
     lift = xp.where(leaves, feet, carried(gait.lift))
-    return GaitState(phases, period, gait.rate, lift, carried(gait.target), gait.apex - motion[:, None, 2])
+    return GaitState(phases, period, gait.rate, lift, carried(gait.target), gait.apex - motion[:, None, 2], gait.hip)
 
 
 def raibert(xp: Any, config: GaitConfig, gait: GaitState, velocity: Any, command: Any) -> tuple[Any, Any]:
@@ -200,4 +211,7 @@ def aim(xp: Any, config: GaitConfig, gait: GaitState, plan: Plan, velocity: Any,
     frozen = swinging & (phases > FREEZE * fraction)
     target = xp.where(frozen[..., None], gait.target, target)
     apex = xp.where(frozen, gait.apex, base + plan.apex)
-    return gait._replace(target=target, apex=apex, rate=plan.rate)
+    over = xp.amax(xp.where(swinging, apex - gait.lift[..., 2], 0 * apex), -1) - config.lift + LINK + _OVER
+    hip = xp.clip(over, config.hip_height, config.highest_hip)
+    hip = gait.hip + (hip - gait.hip) * (CONTROL_DT / _RISE)
+    return gait._replace(target=target, apex=apex, rate=plan.rate, hip=hip)

@@ -32,7 +32,7 @@ class RewardConfig:
         roll_pitch_rate: squared rates of roll and pitch.
         orientation: squared tilt of the trunk.
         base_height: 1 - exp(-error^2 / (3 cm)^2) of the trunk's height over the feet that stand, against
-            ``gait.hip_height``: footholds are chosen for legs that hang from there.
+            the gait's: footholds are chosen for legs that hang from there.
         torque: squared joint torques.
         joint_acceleration: squared joint accelerations.
         joint_speed: squares of what joint speeds exceed 0.9 of the data sheet's by [(rad/s)^2].

@@ -384,7 +384,7 @@ class LocoEnvironment:
             linear=rotate_inverse(jnp, quaternion, body.qvel[:, :3]),
             angular=body.qvel[:, 3:6],
             gravity=gravity,
-            height_error=steps.height - self.config.gait.hip_height,
+            height_error=steps.height_error,
             joint_speed=body.qvel[:, 6:],
             last_joint_speed=old.body.qvel[:, 6:],
             torque=torque,

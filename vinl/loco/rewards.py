@@ -37,7 +37,7 @@ class Motion(NamedTuple):
     Attributes:
         linear, angular: (n, 3) velocity of the trunk [m/s, rad/s].
         gravity: (n, 3) unit vector down.
-        height_error: (n,) of the trunk over the feet that stand [m].
+        height_error: (n,) of the trunk over the feet that stand, against the gait's [m].
         joint_speed, last_joint_speed: (n, 12) now and a control step ago [rad/s].
         torque: (n, 12) [N m].
         action, last_action: (n, 12).

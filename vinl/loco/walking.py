@@ -55,7 +55,7 @@ class Steps(NamedTuple):
         gap: (n, 4) from each leg below the knee to the nearest block or wall [m].
         blocked: (n, 4) swinging feet whose foothold is on a block or nearer to one than ``gait.edge``.
         speed: (n, 4) of the feet along the ground [m/s].
-        height: (n,) of the trunk over the feet that stand [m].
+        height_error: (n,) of the trunk over the feet that stand, against the gait's [m].
     """
 
     path_error: Float[Array, "n 4 3"]
@@ -64,7 +64,7 @@ class Steps(NamedTuple):
     gap: Float[Array, "n 4"]
     blocked: Bool[Array, "n 4"]
     speed: Float[Array, "n 4"]
-    height: Float[Array, " n"]
+    height_error: Float[Array, " n"]
 
 
 def start_walk(config: GaitConfig, body: Body) -> Walk:
@@ -115,7 +115,7 @@ def go_on(
         gap=_leg_gap(view, body, feet),
         blocked=swing & (view.clearance(gait.target) - FOOT_RADIUS < config.edge),
         speed=jnp.hypot(feet[..., 0] - x, feet[..., 1] - y) / CONTROL_DT,
-        height=FOOT_RADIUS - below,
+        height_error=FOOT_RADIUS - below - gait.hip,
     )
     return Walk(gait, plan), steps
 

@@ -38,7 +38,7 @@ _PLAN_UNITS = (0.1,) * 8 + (0.05,) * 8 + (0.2,) * 4
 _MAP_UNIT = 0.05
 """The same of a height map [m]."""
 
-_GAIT_NUMBERS = (4, 1, 4, 12, 12, 4)
+_GAIT_NUMBERS = (4, 1, 4, 12, 12, 4, 1)
 """Sizes of the fields of ``GaitState``."""
 
 
@@ -163,7 +163,7 @@ class SteppingActor(PolicyNetwork):
         n = state[-1].shape[1]
         fields = state[-2][0].split(_GAIT_NUMBERS, 1)
         lift, target = (x.reshape(n, 4, 3) for x in fields[3:5])
-        gait = GaitState(fields[0], fields[1][:, 0], fields[2], lift, target, fields[5])
+        gait = GaitState(fields[0], fields[1][:, 0], fields[2], lift, target, fields[5], fields[6][:, 0])
         return Memory(tuple(state[:-2]), gait, state[-1][0])
 
     @staticmethod
