@@ -37,7 +37,7 @@ from vinl.policies.depth_actor import DepthActor
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.policies.nav_actor import NavActor
-from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
+from vinl.robot.cameras import NAVIGATION_CAMERA, Camera
 from vinl.robot.observation import PROPRIOCEPTION_SIZE
 from vinl.world.clutter import CLUTTER
 from vinl.world.readers import load_floorplan, shipped_floorplans
@@ -119,9 +119,7 @@ def untrained_locomotor() -> DepthPolicy:
     network, seen = config.network, config.camera
     sizes = (seen.height, seen.width, network.visual, network.hidden, network.layers)
     actor = DepthActor(network.vision, *sizes, memory=network.memory)
-    camera = Camera(
-        "locomotion", LOCOMOTION_CAMERA.position, seen.pitch_down, seen.hfov, seen.width, seen.height, seen.far
-    )
+    camera = seen.record()
     return DepthPolicy(actor, locomotion_card("untrained", actor.describe(), scan=False, camera=camera.describe()))
 
 

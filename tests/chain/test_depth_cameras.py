@@ -24,13 +24,13 @@ def stand(x: float, y: float, yaw: float = 0.0) -> np.ndarray:
 
 
 def test_walls_and_blocks_are_where_they_are(two_rooms: FloorPlan) -> None:
-    """Room two reaches to x = 9 m less half a wall; the camera is 0.35 m before the trunk's middle."""
+    """Room two reaches to x = 9 m less half a wall; the camera is 0.32 m before the trunk's middle."""
     cameras = open_depth_cameras(two_rooms, [NONE, BLOCK, NONE], LEVEL)
     depth = cameras.look(np.stack([stand(5.0, 3.0)] * 2 + [stand(7.0, 3.0, np.pi)]))
     assert depth.shape == (3, 9, 9)
-    assert depth[0, 4, 4] == pytest.approx(9 - 0.05 - 5.35, abs=1e-3)
-    assert depth[1, 4, 4] == pytest.approx(5.9 - 5.35, abs=1e-3)
-    assert depth[2, 4, 4] == pytest.approx(6.65 - 0.05, abs=1e-3)  # through the door to the far wall
+    assert depth[0, 4, 4] == pytest.approx(9 - 0.05 - 5.32, abs=1e-3)
+    assert depth[1, 4, 4] == pytest.approx(5.9 - 5.32, abs=1e-3)
+    assert depth[2, 4, 4] == pytest.approx(6.68 - 0.05, abs=1e-3)  # through the door to the far wall
     assert depth[0, 8, 4] == pytest.approx(0.38 / (LEVEL.tan_half[1] * 8 / 9), abs=1e-3)  # the floor
 
 

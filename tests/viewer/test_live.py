@@ -1,11 +1,21 @@
 """A live session without a browser: it walks, obeys, and changes its world under the robot."""
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
+import torch
 
 import vinl
 from vinl.config.errors import InputError
-from vinl.policies.policy import Policy
+from vinl.config.loader import load_config
+from vinl.gait.config import GaitConfig
+from vinl.gait.observation import SENSED_TABLE, STEPPING_TABLE
+from vinl.policies.card import locomotion_card
+from vinl.policies.depth_policy import DepthPolicy
+from vinl.policies.networks import PolicyNetwork, StepActor
+from vinl.policies.policy import LocomotionPolicy, Policy
+from vinl.policies.stepping_actor import SteppingActor
 from vinl.viewer.live import LiveChain
 from vinl.viewer.requests import (
     ChangePolicies,
@@ -21,6 +31,7 @@ from vinl.viewer.requests import (
     ToggleBlock,
 )
 from vinl.viewer.session import Session
+from vinl.viewer.snapshot import Snapshot
 from vinl.viewer.world import TOO_CLOSE, open_ground, open_home
 
 CONFIG = vinl.EvaluationConfig()
@@ -161,7 +172,7 @@ def test_policies_and_plan_are_changed(session: Session):
     session.ask(SetGoal(x + 1.0, y))
     assert session.advance(2).command.any()
     seen = session.snapshot.images["navigation"]
-    assert seen.depth.shape == (seen.camera.height, seen.camera.width) != (48, 80)
+    assert seen.depth.shape == (seen.camera.height, seen.camera.width) == (60, 80)
     session.ask(ChangePolicies(locomotion="nav"))
     assert "locomotion policy" in session.advance(1).notice[1]
     session.ask(OpenPlan("mill_loft"))
@@ -202,6 +213,62 @@ def test_footholds_are_shown_where_a_policy_tells_them(rough: Policy):
     np.testing.assert_allclose(snapshot.footholds.planned[0, :2], expected, atol=2e-3)
     plain = Session(LiveChain(world, rough, "oracle", CONFIG)).snapshot
     assert plain.footholds.planned is None and plain.footholds.predicted is None
+
+
+def with_gait() -> Policy:
+    """Observes the rows of a gait; random weights, it stands nearly still."""
+    torch.manual_seed(0)
+    network: PolicyNetwork = StepActor(STEPPING_TABLE.size, actor=[16])
+    return LocomotionPolicy(
+        network, locomotion_card("steps", network.describe(), scan=False, gait=asdict(GaitConfig()))
+    )
+
+
+def test_planned_footholds_are_those_of_the_gait_and_outlast_a_block():
+    def walk(blocks: list[ToggleBlock]) -> tuple[Snapshot, Snapshot]:
+        session = Session(LiveChain(open_ground("flat", 0), with_gait(), "oracle", CONFIG))
+        session.ask(Drive(0.5, 0.0))
+        before = session.advance(20)
+        for block in blocks:
+            session.ask(block)
+        return before, session.advance(10)
+
+    before, after = walk([])
+    assert before.footholds.planned is not None and after.footholds.planned is not None
+    assert np.abs(before.footholds.planned[:, 2] - before.feet[:, 2]).max() < 0.03  # on level ground, as the feet
+    ahead = before.footholds.planned[:, 0] - before.feet[:, 0]
+    assert 0.0 < ahead.mean() < 0.4
+    _, other = walk([ToggleBlock(3.0, 3.0)])
+    assert other.footholds.planned is not None
+    np.testing.assert_allclose(other.footholds.planned, after.footholds.planned, atol=2e-3)  # the clock went on
+
+
+def test_footholds_of_a_policy_that_predicts_them():
+    network = SteppingActor(vision="none", hidden=8, layers=1, actor=[8])
+    policy = DepthPolicy(network, locomotion_card("student", network.describe(), table=SENSED_TABLE))
+    session = Session(LiveChain(open_ground("flat", 0), policy, "oracle", CONFIG))
+    assert session.snapshot.footholds.predicted is None
+    seen = session.advance(5)
+    assert seen.footholds.planned is None and seen.footholds.predicted is not None
+    assert np.linalg.norm(seen.footholds.predicted - seen.feet, axis=1).max() < 0.15  # it has no command: as it stands
+
+
+def test_errors_of_sensors_and_faults_are_those_of_the_evaluation(rough: Policy):
+    def walk(*settings: str) -> Snapshot:
+        rules = load_config(vinl.EvaluationConfig, "eval/default", settings)
+        session = Session(LiveChain(open_home(PLAN, "none", 0, rules), rough, "nav", rules))
+        x, y = session.snapshot.qpos[:2]
+        session.ask(SetGoal(x + 1.0, y))
+        session.advance(30)
+        session.ask(ToggleBlock(x - 1.0, y))  # late motors and cameras outlive a change of the world
+        return session.advance(5)
+
+    ideal, faulty = walk(), walk("faults.action_delay=0.02", "faults.velocity_noise=0.1", "faults.kp_scale=0.8")
+    assert np.linalg.norm(ideal.qpos - faulty.qpos) > 1e-3
+    np.testing.assert_array_equal(faulty.images["navigation"].depth > 0, True)
+    seen = walk("sensors=sensors/realistic", "odometry.drift=[0.02,0.02]")
+    assert (seen.images["navigation"].depth == 0).mean() > 0.005  # pixels without a return
+    np.testing.assert_array_equal(seen.qpos, walk("sensors=sensors/realistic", "odometry.drift=[0.02,0.02]").qpos)
 
 
 def test_open_ground_keeps_the_start_clear():

@@ -33,6 +33,10 @@ def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
         ("--port 70000", "--port must lie between 0 and 65535"),
         ("--replay nowhere", "vinl eval --record"),
         ("--replay . --loco rough", "--replay shows what was recorded"),
+        ("--replay . --sensors realistic", "takes no --sensors"),
+        ("--sensors realistc", "did you mean 'realistic'"),
+        ("faults.action_delay=0.5s", "faults.action_delay=0.5s"),
+        ("--config loco/rough", "is a config of locomotion"),
         ("--prot 80", "--port"),
     ],
 )

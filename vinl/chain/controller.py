@@ -64,6 +64,18 @@ class LocomotionController:
         if self._gait is not None:
             self._gait.reset(np.ones(which, bool) if isinstance(which, int) else which)
 
+    def footholds(self) -> dict[str, Float[np.ndarray, "n 4 3"]]:
+        """Where the feet come down next by the plan of the last step, as ``planned``, in the heading frames that the
+        robots had then [m]; nothing without a gait or before the first step."""
+        gait = None if self._gait is None else self._gait.gait
+        return {} if gait is None else {"planned": gait.target}
+
+    def take_over(self, before: LocomotionController) -> None:
+        """Go on with the same robots in another world: their last actions, and their gait."""
+        self.actions = before.actions
+        if self._gait is not None and before._gait is not None:
+            self._gait.take_over(before._gait)
+
     def step(
         self,
         qpos: Float[np.ndarray, "n 19"],

@@ -96,6 +96,10 @@ class GaitReader:
         if len(self._fresh):
             self._fresh |= which
 
+    def take_over(self, before: GaitReader) -> None:
+        """Go on with the gaits of the same robots on another map."""
+        self.gait, self._last, self._fresh = before.gait, before._last, before._fresh
+
     def read(
         self, qpos: Float[np.ndarray, "n 19"], qvel: Float[np.ndarray, "n 18"], command: Float[np.ndarray, "n 3"]
     ) -> Float[np.ndarray, "n 53"]:

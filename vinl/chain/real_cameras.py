@@ -35,6 +35,11 @@ class CameraErrors:
         """Where the robots are; once in every control step."""
         self._poses.append(qpos.copy())
 
+    def restart(self, qpos: Float[np.ndarray, "n 19"]) -> None:
+        """The robots begin anew, where they are: older poses are forgotten."""
+        self._poses.clear()
+        self.note(qpos)
+
     def before(self, steps: np.ndarray) -> Float[np.ndarray, "n 19"]:
         """Where each robot was so many control steps ago, or at the start."""
         latest = len(self._poses) - 1

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vinl.cli.kinds import load_rules
 from vinl.cli.options import Settings, default_out, parse_options, settings_first
 from vinl.config.errors import InputError
 
@@ -100,7 +101,6 @@ def main(argv: list[str]) -> int:
     from vinl.benchmark.protocol import Films, Protocol
     from vinl.benchmark.routes import read_routes
     from vinl.chain.choose import best_locomotor, best_navigator
-    from vinl.cli.kinds import check_config
     from vinl.config.output import check_out, strip_command
     from vinl.world.readers import load_floorplans
 
@@ -120,7 +120,6 @@ def main(argv: list[str]) -> int:
     if options.cluster is not None and options.device == "cuda":
         raise InputError("--cluster asks policies on CPUs; leave --device cuda out")
     check_folder(out, options.table or options.faults)
-    check_config(options.config, "evaluation")
     config = _load_rules(options)
 
     def prepare() -> Protocol:
@@ -236,16 +235,7 @@ def _load_row(loco: str, nav: str, obstacles: str, recovery: bool, options: Opti
 
 
 def _load_rules(options: Options) -> EvaluationConfig:
-    from vinl.chain.config import EvaluationConfig
-    from vinl.config.loader import load_config
-
-    errors = []
-    if options.sensors is not None:
-        name = options.sensors
-        errors.append(f"sensors={name if name.endswith(('.yaml', '.yml')) else f'sensors/{name}'}")
-    if options.drift is not None:
-        errors.append(f"odometry.drift=[{options.drift},{options.drift}]")
-    return load_config(EvaluationConfig, options.config, [*errors, *options.overrides])
+    return load_rules(options.config, options.overrides, options.sensors, options.drift)
 
 
 def _walk(

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vinl.config.errors import InputError
+from vinl.config.fields import closest
 from vinl.policies.card import read_card
 from vinl.policies.io import find_policy
 from vinl.rl.run_folder import METRICS, RunFolder
+
+if TYPE_CHECKING:
+    from vinl.chain.config import EvaluationConfig
 
 COMMANDS = {"locomotion": "vinl train-loco", "navigation": "vinl train-nav"}
 """Kind of policy to the command that trains it."""
@@ -26,6 +32,34 @@ def check_config(name: str, kind: str) -> None:
     if found != kind:
         instead = f": use {COMMANDS[found]} --config {name}" if found in COMMANDS else ""
         raise InputError(f"--config {name} is a config of {found}, not of {kind}{instead}")
+
+
+def load_rules(config: str, overrides: Sequence[str], sensors: str | None, drift: float | None) -> EvaluationConfig:
+    """The rules of episodes of the chain.
+
+    Args:
+        config: a shipped config or a YAML file.
+        overrides: settings as ``key=value``.
+        sensors: errors of the depth cameras: a shipped group's name, or a YAML file; None: as in the config.
+        drift: of the odometry, a fraction; None: as in the config.
+
+    Raises:
+        InputError: a config of another kind, or a setting that is none.
+    """
+    from vinl.chain.config import EvaluationConfig
+    from vinl.config.loader import list_configs, load_config
+
+    check_config(config, "evaluation")
+    errors = []
+    if sensors is not None:
+        groups = [name.removeprefix("sensors/") for name in list_configs() if name.startswith("sensors/")]
+        is_file = sensors.endswith((".yaml", ".yml"))
+        if not is_file and sensors not in groups:
+            raise InputError(f"--sensors {sensors!r} is unknown{closest(sensors, groups)}; known: {', '.join(groups)}")
+        errors.append(f"sensors={sensors if is_file else f'sensors/{sensors}'}")
+    if drift is not None:
+        errors.append(f"odometry.drift=[{drift},{drift}]")
+    return load_config(EvaluationConfig, config, [*errors, *overrides])
 
 
 def check_source(name: str, kind: str) -> None:

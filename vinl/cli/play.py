@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from vinl.cli.options import parse_options
+from vinl.cli.kinds import load_rules
+from vinl.cli.options import Settings, parse_options, settings_first
 from vinl.config.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,6 +20,8 @@ class Options:
     """Watch the robot in the browser and drive it: click a goal, or use the keyboard and sliders; drop blocks, push it,
     pause, go step by step; see what its cameras see. Or scrub through an episode that vinl eval --record kept."""
 
+    overrides: Settings = ()
+    """Rules of the evaluation in place of the config's, for example faults.action_delay=0.02."""
     plan: str | None = None
     """Floor plan: a shipped one's name, or a file (see vinl eval); by default the first shipped one."""
     terrain: str | None = None
@@ -33,6 +36,12 @@ class Options:
     """On open ground: blocks per m2, 0 to 4 (1 by default), or objects of litter per m2, 0 to 30 (10 by default)."""
     seed: int = 0
     """Of clutter and start; the same as in vinl eval."""
+    sensors: str | None = None
+    """Errors of the depth cameras, as in vinl eval: ideal (none, the default), realistic, or a YAML file."""
+    drift: float | None = None
+    """Of the odometry by which a learned navigator knows where it is, as in vinl eval (0.02: 2 %; default: 0)."""
+    config: str = "eval/default"
+    """Rules of the evaluation: a shipped config or a YAML file."""
     replay: str | None = None
     """Folder of vinl eval --record: show its episodes instead of a live robot."""
     episode: int = 0
@@ -47,7 +56,7 @@ class Options:
 
 def main(argv: list[str]) -> int:
     """Show the page until Ctrl-C."""
-    options = parse_options(Options, argv, "play")
+    options = parse_options(Options, settings_first(Options, argv), "play")
     _check(options)
     from rich.console import Console
 
@@ -73,6 +82,8 @@ def _check(options: Options) -> None:
         raise InputError(f"--{given[0]} and --{given[1]} do not go together; give one of them")
     if options.replay is not None and (options.loco is not None or options.nav is not None):
         raise InputError("--replay shows what was recorded; it takes no --loco, --policy or --nav")
+    if options.replay is not None and (options.overrides or options.sensors is not None or options.drift is not None):
+        raise InputError("--replay shows what was recorded; it takes no --sensors, --drift or settings")
     if not 0 <= options.port <= 65535:
         raise InputError(f"--port must lie between 0 and 65535, got {options.port}")
     if options.seed < 0:
@@ -94,5 +105,6 @@ def _open(options: Options) -> Viewer:
         terrain=options.terrain,
         density=options.density,
         pace=options.pace,
+        config=load_rules(options.config, options.overrides, options.sensors, options.drift),
         **server,
     )

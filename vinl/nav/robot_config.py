@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from vinl.config.errors import InputError
 from vinl.config.limits import Range, check_number, check_range
-from vinl.robot.cameras import Camera
+from vinl.robot.cameras import NAVIGATION_CAMERA, Camera
 
 Pair = tuple[float, float]
 """Of roll and of pitch."""
@@ -56,14 +56,14 @@ class NavCameraConfig:
             ``vinl.robot.cameras.MISSING``.
     """
 
-    pitch_down: float = 0.0
-    hfov: float = math.pi / 2
-    width: int = 80
-    height: int = 60
-    far: float = 10.0
-    forward: float = 0.35
+    pitch_down: float = NAVIGATION_CAMERA.pitch_down
+    hfov: float = NAVIGATION_CAMERA.hfov
+    width: int = NAVIGATION_CAMERA.width
+    height: int = NAVIGATION_CAMERA.height
+    far: float = NAVIGATION_CAMERA.far
+    forward: float = NAVIGATION_CAMERA.position[0]
     mount_height: float = 0.36
-    missing: str = "fill"
+    missing: str = NAVIGATION_CAMERA.missing
 
     def __post_init__(self) -> None:
         self.record()

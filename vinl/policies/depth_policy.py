@@ -39,6 +39,15 @@ class DepthNetwork(Protocol):
         ...
 
 
+@runtime_checkable
+class PlansFootholds(Protocol):
+    """A network whose memory holds where the feet are to come down."""
+
+    def footholds(self, state: State) -> Float[Tensor, "n 4 3"]:
+        """In the robots' heading frames [m]."""
+        ...
+
+
 class DepthPolicy:
     """Observations (n, k) and depth images (n, H, W) to actions (n, a), without noise, on the device of its network.
 
@@ -110,6 +119,13 @@ class DepthPolicy:
             if isinstance(observation, Tensor):
                 return action[0].to(observation.device, observation.dtype)
             return action[0].cpu().numpy()
+
+    def footholds(self) -> dict[str, Float[np.ndarray, "n 4 3"]]:
+        """Where the feet come down next, as ``predicted``, in the heading frames that the robots had in the last step
+        [m]; nothing if the network plans no footholds, or before the first step."""
+        if not isinstance(self.network, PlansFootholds) or not len(self._fresh) or self._fresh.any():
+            return {}
+        return {"predicted": self.network.footholds(self._state).cpu().numpy()}
 
     def _begin(self, n: int) -> None:
         self._state = cast(DepthNetwork, self.network).initial_state(n, self.device)

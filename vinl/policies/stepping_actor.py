@@ -172,6 +172,10 @@ class SteppingActor(PolicyNetwork):
         fields = [field.reshape(len(field), -1) for field in memory.gait]
         return (*memory.network, torch.cat(fields, 1)[None], memory.velocity[None])
 
+    def footholds(self, state: State) -> Float[Tensor, "n 4 3"]:
+        """Where the feet come down next, in the robots' heading frames [m]."""
+        return self.unpack(state).gait.target
+
     # ---- parts of a step --------------------------------------------------------------------------------------------
 
     def feel(self, vector: Float[Tensor, "n 45"]) -> dict[str, Tensor]:

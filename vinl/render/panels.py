@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 from jaxtyping import Float, UInt8
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from vinl.chain.records import EpisodeRecord
 from vinl.render.drawing import keep_low
@@ -115,7 +115,8 @@ def compose(
     left = SIZE[0] - _SIDE
     for k, (eye, title) in enumerate(zip(eyes, ("locomotion camera", "navigation camera"), strict=True)):
         x = left + 8 + k * (_EYE[0] + 4)
-        frame.paste(Image.fromarray(eye).resize((_EYE[0] - 8, _EYE[1]), Image.Resampling.NEAREST), (x, 22))
+        room = (_EYE[0] - 8, _EYE[1])
+        frame.paste(ImageOps.pad(Image.fromarray(eye), room, Image.Resampling.NEAREST, _PAPER), (x, 22))
         pen.text((x, 4), title, fill=_MUTED, font=_font(13))
     frame.paste(plan, (left, _EYE[1] + 26))
     y = SIZE[1] - _BAR

@@ -69,9 +69,11 @@ class Camera:
         return asdict(self)
 
 
-LOCOMOTION_CAMERA = Camera("locomotion", (0.35, 0.0, 0.0), math.radians(30), math.radians(87), 64, 36, 2.0)
-"""Looks down at the ground in front of the feet [paper III-C; mount and pitch of ViNL aliengo.py; field of view of
-the Intel D435, because the paper names none]."""
+LOCOMOTION_CAMERA = Camera("locomotion", (0.32, 0.0, 0.0), 0.524, 1.518, 64, 36, 2.0)
+"""Looks 30 deg down at the ground in front of the feet, 87 deg wide like the Intel D435; what all shipped locomotion
+policies with a camera see through. ViNL has it at 0.35 m, where it looks through a wall that the nose (0.339 m)
+touches."""
 
-NAVIGATION_CAMERA = Camera("navigation", (0.35, 0.0, 0.0), math.radians(-15), math.radians(70), 80, 48, 10.0)
-"""Looks ahead and 15 deg up [ViNL aliengoNav.py]; a quarter of the paper's 320 x 180."""
+NAVIGATION_CAMERA = Camera("navigation", (0.32, 0.0, 0.0), 0.0, 1.5708, 80, 60, 10.0, "fill")
+"""Looks ahead, level and 90 deg wide; what the shipped navigation policy sees through. ViNL's, at 0.35 m, 15 deg up,
+70 deg and 320 x 180 pixels, is in the config ``nav/paper``."""

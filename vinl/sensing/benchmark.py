@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import torch
 import warp as wp
 
 from vinl.config.errors import InputError
-from vinl.robot.cameras import NAVIGATION_CAMERA
+from vinl.robot.cameras import Camera
 from vinl.sensing.depth import DepthCamera, check_device
 from vinl.sensing.kernels import cast_rays
 from vinl.world.boxes import Boxes
@@ -63,7 +62,7 @@ def run_depth(
             raise InputError(f"bench depth: {name} must be positive, got {value}")
     rng = np.random.default_rng(seed)
     meshes = [_draw_home(rng) for _ in range(homes)]
-    record = replace(NAVIGATION_CAMERA, width=width, height=height)
+    record = Camera("navigation", (0.35, 0.0, 0.0), math.radians(-15), math.radians(70), width, height, 10.0)
     camera = DepthCamera(meshes, record, device=chosen, dtype=torch.float16 if half else torch.float32)
     world, position, rotation = _draw_poses(rng, num_images, homes, chosen)
     out = camera.render(world, position, rotation)

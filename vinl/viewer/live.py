@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-import mujoco
 import numpy as np
 from jaxtyping import Float
 
@@ -16,7 +16,10 @@ from vinl.chain.config import EvaluationConfig
 from vinl.chain.contacts import KINDS
 from vinl.chain.controller import open_controller
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
+from vinl.chain.faults import FaultyState, change_body
 from vinl.chain.navigators.base import Navigator, Task, decide
+from vinl.chain.odometry import DeadReckoning
+from vinl.chain.real_cameras import CameraErrors, RealCameras
 from vinl.chain.robot import Robot
 from vinl.chain.scene import FORCE_SENSORS, build_scene
 from vinl.config.errors import InputError
@@ -57,8 +60,8 @@ class TellsFootholds(Protocol):
     """A policy or navigator that knows where the feet are to come down."""
 
     def footholds(self) -> dict[str, Float[np.ndarray, "n 4 3"]]:
-        """``planned`` and ``predicted`` footholds, as far as there are such, in the robots' heading frames [m]: the
-        origin in the middle of the trunk, x along its heading, z up."""
+        """``planned`` and ``predicted`` footholds, as far as there are such, in the heading frames that the robots had
+        when they were last asked [m]: the origin in the middle of the trunk, x along its heading, z up."""
         ...
 
 
@@ -69,8 +72,9 @@ class LiveChain:
         world: where it walks.
         locomotion: locomotion policy, or its name or folder; None: the best shipped one.
         navigation: navigator, or its name or folder.
-        config: rules of the evaluation: how often the navigator decides, what is a fall, what a goal reached.
-        seed: of what is drawn: clutter, dropped blocks.
+        config: rules of the evaluation: how often the navigator decides, what is a fall, what a goal reached; errors
+            of cameras and odometry, faults of the body.
+        seed: of what is drawn: clutter, dropped blocks, errors.
     """
 
     dt = CONTROL_DT
@@ -85,6 +89,8 @@ class LiveChain:
         seed: int = 0,
     ) -> None:
         self._config, self._rng = config, np.random.Generator(np.random.Philox(seed))
+        self._seed = seed % 2**31
+        self._errors = None if config.sensors.is_ideal else CameraErrors(config.sensors, [self._seed])
         self._locomotion = choose_locomotor(locomotion)
         self._navigator = self._load_navigator(navigation)
         check_cameras(self._locomotion, self._navigator)
@@ -137,11 +143,16 @@ class LiveChain:
         """
         if self._state == "fallen":
             return True
+        qpos, qvel = self._walker.qpos[None].copy(), self._walker.qvel[None].copy()
+        if self._errors is not None:
+            self._errors.note(qpos)
+        known = (qpos, qvel) if self._faulty is None else self._faulty.measure(qpos, qvel, [0])
         if self._goal is not None and self._since_goal % self._config.navigation_period == 0:
             self._decide(self._goal)
         self._since_goal += 1
-        qpos, qvel = self._walker.qpos[None].copy(), self._walker.qvel[None].copy()
-        self._walker.step(self._controller.step(qpos, qvel, self._command)[0])
+        target = self._controller.step(*known, self._command)[0]
+        self._footholds = self._read_footholds()
+        self._walker.step(target)
         self._count()
         if self._walker.has_fallen(self._config.max_tilt):
             self._state, self._goal = "fallen", None
@@ -175,7 +186,7 @@ class LiveChain:
             feet=data.geom_xpos[self._feet].copy(),
             foot_forces=np.linalg.norm(data.sensordata[self._forces].reshape(4, 3), axis=1),
             images=self._images,
-            footholds=self._read_footholds(),
+            footholds=self._footholds,
         )
 
     # ---- the robot -------------------------------------------------------------------------------------------------
@@ -216,6 +227,12 @@ class LiveChain:
         x, y, yaw = pose.tolist()
         self._walker.spawn(x, y, yaw, self.world.joints)
         self._controller.reset(1)
+        faults, qpos = self._config.faults, self._walker.qpos[None]
+        rngs = [np.random.Generator(np.random.Philox(self._seed))]
+        self._faulty = FaultyState(faults, rngs) if faults.spoils_state else None
+        if self._errors is not None:
+            self._errors.restart(qpos)
+        self._footholds = Footholds()
         self._steps, self._distance, self._at = 0, 0.0, self._xy
         self._path: list[np.ndarray] = [self._xy]
         self._contacts: deque[tuple[float, int, float, float, float]] = deque()
@@ -253,6 +270,8 @@ class LiveChain:
         if not np.isfinite(route.geodesic_m):
             raise InputError("there is no path to that goal from here")
         self._navigator.reset([Task(space, route)])
+        odometry = self._config.odometry
+        self._reckoning = None if odometry.is_exact else DeadReckoning(odometry, [self._seed])
         self._goal, self._state, self._since_goal = goal, "walking", 0
         self._choice = np.zeros((1, 2))
         return f"goal: {route.geodesic_m:.1f} m to walk"
@@ -260,8 +279,9 @@ class LiveChain:
     def _decide(self, goal: Float[np.ndarray, "2"]) -> None:
         """Ask the navigator for the next command."""
         pose = np.array([[*self._xy, self._yaw]])
-        depth = None if self._navigator.camera is None else self._cameras["navigation"].look(self._walker.qpos[None])
-        self._choice = decide(self._navigator, goal[None], self._choice, pose, depth=depth)
+        believed = None if self._reckoning is None else self._reckoning.follow(pose)
+        depth = None if self._navigator.camera is None else self._ahead.look(self._walker.qpos[None])
+        self._choice = decide(self._navigator, goal[None], self._choice, pose, believed, depth)
         self._command[0] = [self._choice[0, 0], 0.0, self._choice[0, 1]]
 
     # ---- the world -------------------------------------------------------------------------------------------------
@@ -276,13 +296,22 @@ class LiveChain:
     def _build(self, world: World) -> None:
         """Physics, height scan and cameras of a world."""
         kp, kd = (float(self._locomotion.card.action[key]) for key in ("kp", "kd"))
-        model = build_scene(world.plan.boxes, world.blocks.boxes(), kp=kp, kd=kd)
-        self._walker = Robot(model)
-        self._controller = open_controller(self._locomotion, world.plan, [world.blocks], self._config.ceiling)
-        self._cameras: dict[str, DepthCameras] = {
-            name: open_depth_cameras(world.plan, [world.blocks], camera, self._config.ceiling)
+        faults, blocks, ceiling = self._config.faults, [world.blocks], self._config.ceiling
+        boxes = (world.plan.boxes, world.blocks.boxes())
+        model = build_scene(*boxes, kp=kp * faults.kp_scale, kd=kd * faults.kd_scale)
+        change_body(model, faults)
+        self._walker = Robot(model, faults.delay_steps)
+        self._controller = open_controller(self._locomotion, world.plan, blocks, ceiling, self._errors)
+        ideal = {
+            name: open_depth_cameras(world.plan, blocks, camera, ceiling)
             for name, camera in self._choose_cameras().items()
         }
+        # what the page shows and what the navigator sees have errors of their own: looking on changes no walk
+        self._cameras: Mapping[str, DepthCameras | RealCameras] = ideal
+        self._ahead: DepthCameras | RealCameras = ideal["navigation"]
+        if self._errors is not None:
+            self._cameras = {name: self._errors.put_on(cameras) for name, cameras in ideal.items()}
+            self._ahead = self._errors.put_on(ideal["navigation"])
         self._feet = [int(model.geom(name).id) for name in FOOT_GEOMS]
         first = int(model.sensor(FORCE_SENSORS[0]).adr[0])
         self._forces = slice(first, first + 12)
@@ -290,15 +319,11 @@ class LiveChain:
 
     def _rebuild(self, world: World) -> None:
         """The world changes under the walking robot: its motion goes on."""
-        before: Any = self._walker.data
-        actions = self._controller.actions
+        walker, controller = self._walker, self._controller
         self._build(world)
-        self._controller.actions = actions
-        now: Any = self._walker.data
-        for name in ("qpos", "qvel", "ctrl", "qacc_warmstart"):
-            getattr(now, name)[:] = getattr(before, name)
-        mujoco.mj_forward(self._walker.model, now)
-        self._images = {}
+        self._controller.take_over(controller)
+        self._walker.take_over(walker)
+        self._images, self._footholds = {}, Footholds()
 
     def _toggle_block(self, xy: Float[np.ndarray, "2"]) -> None:
         self._rebuild(self.world.without_block(xy) or self.world.with_block(draw_block(xy, self._rng), self._xy))
@@ -331,7 +356,7 @@ class LiveChain:
             self._go_to(goal)
 
     def _read_footholds(self) -> Footholds:
-        """What the policies tell of their footholds, in the world frame."""
+        """What the policies tell of their footholds, in the world frame; before the robot moves on."""
         found: dict[str, np.ndarray] = {}
         for one in (self._controller, self._locomotion):
             if isinstance(one, TellsFootholds):
