@@ -14,7 +14,7 @@ from vinl.config.loader import load_config
 from vinl.loco import training
 from vinl.loco.config import LocoConfig
 from vinl.loco.environment import LocoEnvironment
-from vinl.loco.lost import KEPT
+from vinl.loco.nan_guard import KEPT
 from vinl.loco.replay import LostState, load_lost, replay
 from vinl.loco.simulation import delay_steps
 from vinl.rl.nan_guard import NotFiniteError, judge_losses

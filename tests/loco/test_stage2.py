@@ -23,13 +23,13 @@ from vinl.loco.config import CurriculumConfig, LocoConfig
 from vinl.loco.curriculum import next_levels
 from vinl.loco.environment import LocoEnvironment
 from vinl.loco.measures import tile_cover
+from vinl.loco.models import MapModel, StepModel
 from vinl.loco.randomisation import plain_traits
 from vinl.loco.simulation import PAST, Body
 from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import find_gait, locomotion_card
 from vinl.policies.io import find_policy, load_policy, save_policy
 from vinl.policies.networks import StepActor, build_network
-from vinl.rl.models import MapModel, StepModel
 from vinl.robot.aliengo import DEFAULT_POSE, FOOT_GEOMS, home_qpos
 from vinl.robot.kinematics import foot_positions
 from vinl.robot.model import robot_spec

@@ -201,7 +201,7 @@ def test_windows_begin_with_the_memory_that_the_roll_out_had(memory):
 
 def test_some_robots_are_told_the_truth_in_the_beginning():
     algorithm = learner(n=4)
-    algorithm.teacher_share = 0.5
+    algorithm.teacher_fraction = 0.5
     batch = observe_standing(4)
     with torch.inference_mode():
         algorithm.act(batch)
@@ -217,8 +217,8 @@ def test_schedules():
     )
     rates = [config.rate_at(s) for s in (0.0, 0.1, 0.5, 1.0)]
     assert rates[0] < 1e-4 < rates[1] and rates[2] == pytest.approx(5.05e-4) and rates[3] == pytest.approx(1e-5)
-    assert [config.teacher_share_at(s) for s in (0.0, 0.25, 0.5, 0.9)] == pytest.approx([0.8, 0.4, 0.0, 0.0])
-    assert DistillationConfig(teacher_until=0.0).teacher_share_at(0.0) == 0.0
+    assert [config.teacher_fraction_at(s) for s in (0.0, 0.25, 0.5, 0.9)] == pytest.approx([0.8, 0.4, 0.0, 0.0])
+    assert DistillationConfig(teacher_until=0.0).teacher_fraction_at(0.0) == 0.0
 
 
 def test_cells_that_are_told_to_remember_do():

@@ -28,7 +28,7 @@ class PaperFigures:
     """Mean and standard deviation over seeds, as published.
 
     Attributes:
-        success: share of episodes that reached the goal [%].
+        success: fraction of episodes that reached the goal [%].
         distance_m: path length walked [m].
         foot_collisions_per_m: by the paper's own rule [1/m].
     """

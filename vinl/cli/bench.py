@@ -34,7 +34,7 @@ class LocoOptions:
 
 @dataclass(frozen=True)
 class DepthOptions:
-    """Depth images per second over house meshes, and the share of a bare ray kernel's speed."""
+    """Depth images per second over house meshes, and the fraction of a bare ray kernel's speed."""
 
     num_images: int | None = None
     """Images in one launch (default: 4096 on a GPU, 32 on a CPU)."""

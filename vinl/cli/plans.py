@@ -136,8 +136,8 @@ def _show_plan(options: ShowPlan) -> None:
     print(f"{plan.name}: {plan.area_m2:.1f} m2 of free floor in {plan.source}")
     print(f"  grid      {columns * plan.frame.resolution:.1f} m x {rows * plan.frame.resolution:.1f} m")
     print(f"  boxes     {len(plan.walls)} of walls, {len(plan.furniture)} of furniture, {len(blocks)} blocks")
-    share = (space.regions == space.largest).sum() / space.traversable.sum()
-    print(f"  regions   {space.regions.max()}; the largest holds {share:.0%} of where the robot can be")
+    fraction = (space.regions == space.largest).sum() / space.traversable.sum()
+    print(f"  regions   {space.regions.max()}; the largest holds {fraction:.0%} of where the robot can be")
     for pair in pairs:
         note = f" ({pair.note})" if pair.note else ""
         print(f"  episode   {pair.straight_m:.1f} m straight, {pair.geodesic_m:.1f} m on foot{note}")

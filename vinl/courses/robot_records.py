@@ -102,7 +102,7 @@ def aggregate_robots(
         add("dirty_steps", "dirty", "swings")
         add("dirty_foot_steps", "dirty_foot", "swings")
         figures["steps"] = int(columns["swings"].sum())
-        add("trunk_over_blocks", "over", "steps", lambda share: share / covered)
+        add("trunk_over_blocks", "over", "steps", lambda fraction: fraction / covered)
     figures["metres"] = float(columns["metres"].sum())
     levels = [r.level for r in records if r.level is not None]
     figures["mean_level"] = float(np.mean(levels)) if levels else None
@@ -114,8 +114,8 @@ def aggregate_robots(
         for limb in ("foot", "leg"):
             steps = np.sum([getattr(r, f"{limb}_height_steps") for r in records], axis=0)
             figures[f"{limb}_block_per_m_by_height"] = {
-                name: float(count / share / figures["metres"]) if share > 0 else None
-                for name, count, share in zip(HEIGHT_NAMES, steps, height_fractions, strict=True)
+                name: float(count / fraction / figures["metres"]) if fraction > 0 else None
+                for name, count, fraction in zip(HEIGHT_NAMES, steps, height_fractions, strict=True)
             }
     figures["ci95"] = intervals
     return round_numbers(figures)

@@ -27,7 +27,7 @@ NEXT = "_next"
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class StateInput:
     """What a policy remembers from step to step, an input and an output of the file.
 
     Attributes:
@@ -60,7 +60,7 @@ class Step(nn.Module):
     def __init__(self, policy: LocomotionPolicy | DepthPolicy) -> None:
         super().__init__()
         self.network = policy.network
-        self.states: tuple[State, ...] = ()
+        self.states: tuple[StateInput, ...] = ()
         self.camera = policy.camera
         self._sees, self._told = isinstance(policy, DepthPolicy), False
         if not self._sees:
@@ -71,9 +71,9 @@ class Step(nn.Module):
         names = getattr(network, "state_names", MEMORY[: len(start)])
         if len(names) != len(start):
             raise InputError(f"{policy.card.name} remembers {len(start)} things, of which {len(names)} have a name")
-        self.states = tuple(State(*pair) for pair in zip(names, start, strict=True))
+        self.states = tuple(StateInput(*pair) for pair in zip(names, start, strict=True))
         if self._told:
-            self.states += (State(BEGUN, torch.zeros(1, 1, device=policy.device)),)
+            self.states += (StateInput(BEGUN, torch.zeros(1, 1, device=policy.device)),)
 
     @property
     def inputs(self) -> tuple[str, ...]:

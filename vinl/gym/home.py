@@ -177,8 +177,8 @@ class HomeEnv(gymnasium.Env):
             if not trip.end:
                 self._decide()
             observation = self._observation.observe(trip, self._command, self._previous)
-        r, share = self._reward, 1.0 / self._rules.navigation_period if self._joints else 1.0
-        reward = r.progress * trip.measure_way() + share * (r.slack + r.collision * touched)
+        r, fraction = self._reward, 1.0 / self._rules.navigation_period if self._joints else 1.0
+        reward = r.progress * trip.measure_way() + fraction * (r.slack + r.collision * touched)
         reward += r.success * (trip.end == "success")
         over = trip.end in ("success", "fall")
         return observation, r.scale * reward, over, bool(trip.end) and not over, self._info(trip)

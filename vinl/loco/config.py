@@ -165,8 +165,8 @@ class CurriculumConfig:
 
     Attributes:
         first_level: robots start on a random level up to this [legged_gym: 5].
-        promote: share of the commanded way that promotes.
-        demote: share of the commanded way that demotes when not reached.
+        promote: fraction of the commanded way that promotes.
+        demote: fraction of the commanded way that demotes when not reached.
         min_way: episodes with less commanded way than this [m] change nothing.
         max_contacts: promote only robots with at most this many control steps of a foot or shank on blocks for each
             metre of progress [1/m]; None: contacts do not matter.
@@ -188,7 +188,7 @@ class CurriculumConfig:
 
 
 @dataclass(frozen=True)
-class PpoConfig:
+class LocoPpoConfig:
     """Proximal policy optimisation [legged_gym].
 
     Attributes:
@@ -208,7 +208,7 @@ class PpoConfig:
         actor, critic, encoder: widths of the hidden layers.
         code: size of the map code that the encoder makes of the height scan [paper III-A].
         update: whose update: rsl_rl (rsl-rl's own), fast (the same numbers with fewer waits for the device; see
-            ``vinl.rl.fast_ppo``) or graphs (fast, its minibatches as CUDA graphs).
+            ``vinl.loco.fast_ppo``) or graphs (fast, its minibatches as CUDA graphs).
     """
 
     steps: int = 24
@@ -247,7 +247,7 @@ class AnnealConfig:
     """Settings that move towards others late in the training: first learn to walk at all, then to walk precisely.
 
     Attributes:
-        begin, end: shares of the iterations between which the settings move, linearly.
+        begin, end: fractions of the iterations between which the settings move, linearly.
         rewards: names and last values of settings of ``RewardConfig`` that move.
         entropy: last value of ``ppo.entropy``; None: it stays.
     """
@@ -268,14 +268,14 @@ class AnnealConfig:
             known = {f.name for f in fields(RewardConfig)}
             raise InputError(f"anneal.rewards: unknown term {', '.join(sorted(set(self.rewards) - known))}") from None
 
-    def blend(self, share: float, before: float, after: float) -> float:
-        """The value of a setting after a share of the iterations."""
-        moved = min(max((share - self.begin) / (self.end - self.begin), 0.0), 1.0)
+    def blend(self, fraction: float, before: float, after: float) -> float:
+        """The value of a setting after a fraction of the iterations."""
+        moved = min(max((fraction - self.begin) / (self.end - self.begin), 0.0), 1.0)
         return before + moved * (after - before)
 
-    def rewards_at(self, share: float, first: RewardConfig) -> RewardConfig:
-        """The reward settings after a share of the iterations, starting from ``first``."""
-        moved = {name: self.blend(share, getattr(first, name), last) for name, last in self.rewards.items()}
+    def rewards_at(self, fraction: float, first: RewardConfig) -> RewardConfig:
+        """The reward settings after a fraction of the iterations, starting from ``first``."""
+        moved = {name: self.blend(fraction, getattr(first, name), last) for name, last in self.rewards.items()}
         return replace(first, **moved)
 
 
@@ -310,7 +310,7 @@ class LocoConfig:
     rewards: RewardConfig = field(default_factory=RewardConfig)
     randomisation: RandomisationConfig = field(default_factory=RandomisationConfig)
     curriculum: CurriculumConfig = field(default_factory=CurriculumConfig)
-    ppo: PpoConfig = field(default_factory=PpoConfig)
+    ppo: LocoPpoConfig = field(default_factory=LocoPpoConfig)
     anneal: AnnealConfig = field(default_factory=AnnealConfig)
     student: StudentConfig | None = None
 

@@ -29,7 +29,7 @@ def next_levels(
         timeout, fallen: (n,) how the episode ended; robots with neither keep their level.
         way: (n,) progress along the command [m].
         commanded: (n,) way that the commands asked for [m].
-        life: (n,) share of the whole episode that was lived, in (0, 1].
+        life: (n,) fraction of the whole episode that was lived, in (0, 1].
         u: (n,) uniform in [0, 1): those beyond the last level go to a random one [ViNL code].
         contacts: (n,) control steps with a foot or shank on a block.
 

@@ -45,7 +45,7 @@ class Distillation:
 
     Attributes:
         learning_rate: of the next update.
-        teacher_share: fraction of the robots that are told the truth in place of what the network predicts.
+        teacher_fraction: fraction of the robots that are told the truth in place of what the network predicts.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Distillation:
         self.student.actor.load_state_dict(teacher.actor.state_dict())
         self.student.actor.requires_grad_(False)
         self._learned = [p for p in self.student.parameters() if p.requires_grad]
-        self.learning_rate, self.teacher_share = config.rate_at(0.0), config.teacher_share
+        self.learning_rate, self.teacher_fraction = config.rate_at(0.0), config.teacher_share
         self.optimizer = torch.optim.Adam(self._learned, lr=self.learning_rate, fused=self.device.type == "cuda")
 
         t, n = config.steps, num_envs
@@ -106,8 +106,8 @@ class Distillation:
                     self._depth[k : k + 1], inputs[None], memory.network, self._fresh[k : k + 1]
                 )
             believed = Prediction(said.velocity[0], said.code[0])
-            if self.teacher_share > 0:
-                told = self._order[:, None] < self.teacher_share
+            if self.teacher_fraction > 0:
+                told = self._order[:, None] < self.teacher_fraction
                 believed = Prediction(*(torch.where(told, a, b) for a, b in zip(truth, believed, strict=True)))
             action, gait = student.walk(vector, believed, memory)
             self._state = student.pack(Memory(network, gait, believed.velocity))
@@ -153,7 +153,7 @@ class Distillation:
             "code": code,
             "unexplained": unexplained,
             "gradient_norm": norm,
-            "teacher_share": self.teacher_share,
+            "teacher_share": self.teacher_fraction,
         }
 
     def losses(self, robots: Tensor) -> tuple[Tensor, Tensor, Tensor]:

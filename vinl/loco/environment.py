@@ -15,12 +15,12 @@ from vinl.gait.observation import GAIT_ROWS, STEPPING_MAP_TABLE, insert_gait, ob
 from vinl.gait.state import GaitState, feet_in_heading_frame
 from vinl.loco.config import MAX_LATENCY, LocoConfig, RandomisationConfig, RewardConfig
 from vinl.loco.curriculum import next_levels
-from vinl.loco.lost import KEPT, REASONS, Lost, keep_lost
 from vinl.loco.measures import TERMS, average_sums, sum_measures, tile_cover
+from vinl.loco.nan_guard import KEPT, REASONS, Lost, keep_lost
 from vinl.loco.randomisation import draw_commands, split_by_name, uniform
 from vinl.loco.rewards import Motion, reward_terms
-from vinl.loco.simulation import Body, Contacts, Ground, Simulation, delay_steps
-from vinl.loco.state import State, begin_episode, count_steps, first_state, strip_weak_types
+from vinl.loco.simulation import Body, Contacts, DeviceGround, Simulation, delay_steps
+from vinl.loco.state import EnvState, begin_episode, count_steps, first_state, strip_weak_types
 from vinl.loco.walking import Steps, flatten_plan, go_on, local_heights
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
 from vinl.robot.observation import CLIP, HEIGHT_SCAN, observe
@@ -136,7 +136,7 @@ class LocoEnvironment:
         self._step = jax.jit(self._advance, donate_argnums=(1, 2))
         self._look = jax.jit(self._observe)
         key = jax.random.PRNGKey(config.seed if seed is None else seed)
-        self.state: State = jax.device_put(jax.jit(self._first_state)(key), device)
+        self.state: EnvState = jax.device_put(jax.jit(self._first_state)(key), device)
         self._lost: Lost = jax.device_put(Lost.none(), device)
 
     def set_rewards(self, rewards: RewardConfig) -> None:
@@ -182,8 +182,8 @@ class LocoEnvironment:
         return average_sums(sums)
 
     def take_lost(self) -> list[dict[str, Any]]:
-        """The states before the steps that went wrong since the last call, of at most ``lost.KEPT`` robots: the fields
-        of ``Lost`` by name, with the reason in words. Waits for the device: call it when ``not_finite`` says so."""
+        """The states before the steps that went wrong since the last call, of at most ``KEPT`` robots: the fields of
+        ``Lost`` by name, with the reason in words. Waits for the device: call it when ``not_finite`` says so."""
         lost = {name: np.asarray(column) for name, column in self._lost._asdict().items()}
         self._lost = jax.device_put(Lost.none(), jax.devices()[0])
         total, seed = int(lost.pop("total")), self.config.seed
@@ -202,10 +202,10 @@ class LocoEnvironment:
     def _settings(self) -> Settings:
         return Settings(self._rewards, self._noise_now)
 
-    def _first_state(self, key: Array) -> State:
+    def _first_state(self, key: Array) -> EnvState:
         return first_state(self.config, self._starts, key)
 
-    def _observe(self, ground: Ground, state: State, settings: Settings) -> Observations:
+    def _observe(self, ground: DeviceGround, state: EnvState, settings: Settings) -> Observations:
         """The noise is the state's own, so that a state that is loaded observes the same."""
         body, traits, c = state.body, state.traits, self.config.randomisation
         heights = scan_ground(jnp, ground.heights, self.simulation.frame, body.qpos)
@@ -251,8 +251,8 @@ class LocoEnvironment:
         return Observations(noisy, exact, privileged, plan, floor, velocity, body.qpos[:, :7] + 0.0)
 
     def _advance(
-        self, ground: Ground, old: State, lost: Lost, given: Float[Array, "n 12"], settings: Settings
-    ) -> tuple[State, Lost, StepResult]:
+        self, ground: DeviceGround, old: EnvState, lost: Lost, given: Float[Array, "n 12"], settings: Settings
+    ) -> tuple[EnvState, Lost, StepResult]:
         c, n, rewards = self.config, self.num_envs, settings.rewards
         keys = split_by_name(StepKeys, old.key)
         action = jnp.clip(jnp.nan_to_num(given), -CLIP, CLIP)
@@ -330,7 +330,7 @@ class LocoEnvironment:
                 lambda a, b: jnp.where(done.reshape((n,) + (1,) * (b.ndim - 1)), a, b), beginning, going
             )
 
-        state = State(
+        state = EnvState(
             key=keys.state,
             body=ended(start.body, body),
             action=ended(jnp.zeros_like(action), action),
@@ -367,8 +367,8 @@ class LocoEnvironment:
 
     def _motion(
         self,
-        ground: Ground,
-        old: State,
+        ground: DeviceGround,
+        old: EnvState,
         body: Body,
         contacts: Contacts,
         torque: Array,

@@ -132,7 +132,7 @@ def average_sums(sums: Float[np.ndarray, " m"]) -> dict[str, float]:
 
 
 def tile_cover(terrain: Terrain) -> Float[np.ndarray, "levels columns"]:
-    """The share of every tile that blocks cover."""
+    """The fraction of every tile that blocks cover."""
     covered, half = np.zeros(terrain.starts.shape[:2], np.float32), round(TILE / RESOLUTION / 2)
     for k, c in np.ndindex(covered.shape):
         i, j = terrain.ground.frame.cell(terrain.starts[k, c, :2])

@@ -19,7 +19,7 @@ from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.loco.config import LocoConfig
 from vinl.loco.environment import MAX_SPEED
-from vinl.loco.lost import Lost
+from vinl.loco.nan_guard import Lost
 from vinl.loco.randomisation import Traits, plain_traits
 from vinl.loco.simulation import Body, Simulation, target_age, torque_range
 from vinl.robot.aliengo import FOOT_GEOMS, JOINTS, SUBSTEPS
@@ -37,8 +37,8 @@ class LostState:
     """A file of ``not_finite/``.
 
     Attributes:
-        values: the fields of ``lost.Lost`` of one robot, by name.
-        reason: what went wrong in the training, a word of ``lost.REASONS``.
+        values: the fields of ``nan_guard.Lost`` of one robot, by name.
+        reason: what went wrong in the training, a word of ``nan_guard.REASONS``.
         config: of the training.
     """
 

@@ -18,13 +18,13 @@ from vinl.robot.aliengo import (
     FOOT_GEOMS,
     FOOT_RADIUS,
     JOINT_SPEED_LIMIT,
+    LEGS,
     PHYSICS_DT,
     SHANK_SPHERES,
     SUBSTEPS,
     TORQUE_LIMIT,
     TRUNK_SPHERES,
 )
-from vinl.robot.aliengo import LEGS as LEG_NAMES
 from vinl.robot.model import robot_spec
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
@@ -35,7 +35,7 @@ from vinl.world.heightfield import BLOCK, WALL, HeightField
 jax.config.update("jax_default_matmul_precision", "highest")
 
 FEET, SHANKS, TRUNK = len(FOOT_GEOMS), len(SHANK_SPHERES), len(TRUNK_SPHERES)
-LEGS = FEET + SHANKS
+LEG_SPHERES = FEET + SHANKS
 _NEAR = 2
 """A contact counts for a block when one lies within this many cells: the sides of a height field slope over one."""
 
@@ -72,7 +72,7 @@ PAST = 3
 """Joint targets that a robot keeps, the newest first: an action may take effect up to two control steps late."""
 
 
-class Ground(NamedTuple):
+class DeviceGround(NamedTuple):
     """The ground on the device. It travels as an argument: as a constant it would be copied into the program.
 
     Attributes:
@@ -181,12 +181,12 @@ class Simulation:
         self.model.hfield_data[:] = normalised
         mx = mjx.put_model(self.model, impl="jax")
         self._start = mjx.make_data(self.model, impl="jax")
-        self._mx = mx.replace(hfield_data=jnp.zeros(1))  # the real one comes in with Ground
+        self._mx = mx.replace(hfield_data=jnp.zeros(1))  # the real one comes in with DeviceGround
         self._feet = np.array([self.model.geom(name).id for name in FOOT_GEOMS])
         spheres = [self.model.geom(name).id for name in (*FOOT_GEOMS, *SHANK_SPHERES, *TRUNK_SPHERES)]
         self._spheres = np.array(spheres)
         self._trunk = self.model.body("trunk").id
-        self._calves = np.array([self.model.body(f"{leg}_calf").id for leg in LEG_NAMES])
+        self._calves = np.array([self.model.body(f"{leg}_calf").id for leg in LEGS])
         self._has_blocks = blocks is not None and len(blocks) > 0
         boxes = blocks.boxes() if blocks is not None else Boxes.empty()
         distance, top = np.zeros((1, 1)), np.zeros((1, 1))
@@ -197,8 +197,8 @@ class Simulation:
         ground_map = build_ground_map(floor, field.frame, boxes + (Boxes.empty() if walls is None else walls))
         grids = (normalised, field.heights, near, distance, top)
         # committed arrays only: a mixture of committed and uncommitted ones compiles every program twice
-        ground = Ground(*(x.reshape(-1) for x in grids), map=ground_map, solid=np.ones((), bool))  # type: ignore[arg-type]
-        self.ground: Ground = jax.device_put(jax.tree.map(jnp.asarray, ground), jax.devices()[0])
+        ground = DeviceGround(*(x.reshape(-1) for x in grids), map=ground_map, solid=np.ones((), bool))  # type: ignore[arg-type]
+        self.ground: DeviceGround = jax.device_put(jax.tree.map(jnp.asarray, ground), jax.devices()[0])
         bare = np.where(field.labels == BLOCK, 0.0, field.heights)  # blocks stand on level tiles
         self._bare = ((bare - low) / span).astype(np.float32).reshape(-1)
         self._solid, self._is_solid = normalised, True
@@ -237,7 +237,7 @@ class Simulation:
         i = jnp.clip(jnp.round((xy[..., 1] - f.y0) / f.resolution), 0, f.shape[0] - 1).astype(jnp.int32)
         return i * f.shape[1] + j
 
-    def block_distance(self, ground: Ground, xy: Float[Array, "*n 2"]) -> Float[Array, "*n"]:
+    def block_distance(self, ground: DeviceGround, xy: Float[Array, "*n 2"]) -> Float[Array, "*n"]:
         """Distance of points [m] from the nearest block's footprint, to half a cell, at most ``FAR``; negative over
         one."""
         if not self._has_blocks:
@@ -245,7 +245,12 @@ class Simulation:
         return ground.distance[self.cell(xy)]
 
     def step(
-        self, ground: Ground, body: Body, targets: Float[Array, "n past 12"], delay: Int[Array, " n"], traits: Traits
+        self,
+        ground: DeviceGround,
+        body: Body,
+        targets: Float[Array, "n past 12"],
+        delay: Int[Array, " n"],
+        traits: Traits,
     ) -> tuple[Body, Contacts, Float[Array, "n 12"]]:
         """One control step of all robots.
 
@@ -261,7 +266,7 @@ class Simulation:
         """
         return self._substeps(ground, body, (targets, delay), traits)
 
-    def robot_model(self, ground: Ground, traits: Traits) -> mjx.Model:
+    def robot_model(self, ground: DeviceGround, traits: Traits) -> mjx.Model:
         """The model of one robot on its ground; ``traits`` without their first axis."""
         mx = self._mx
         gain = mx.actuator_gainprm.at[:, 0].multiply(traits.kp)
@@ -283,7 +288,7 @@ class Simulation:
         return mjx.step(model, self._start.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warm, ctrl=target))
 
     def _control_step(
-        self, ground: Ground, body: Body, told: tuple[Float[Array, "past 12"], Int[Array, ""]], traits: Traits
+        self, ground: DeviceGround, body: Body, told: tuple[Float[Array, "past 12"], Int[Array, ""]], traits: Traits
     ) -> tuple[Body, Contacts, Float[Array, "12"]]:
         """The substeps of one robot."""
         model = self.robot_model(ground, traits)
@@ -298,14 +303,14 @@ class Simulation:
         start = body, Contacts.none(), jnp.zeros(12)
         return jax.lax.scan(substep, start, jnp.arange(SUBSTEPS))[0]
 
-    def _touching(self, ground: Ground, data: mjx.Data) -> Contacts:
+    def _touching(self, ground: DeviceGround, data: mjx.Data) -> Contacts:
         """The contacts of one robot after a physics step."""
         contact = data._impl.contact
         on = contact.dist[self._ground_rows] < 0
         up, z = contact.frame[:, 0, 2][self._ground_rows], contact.pos[:, 2][self._ground_rows]
         # blocks and walls stand on level ground at z = 0: what is higher or leans is not that ground
-        raised = jnp.any(on[:LEGS] & ((up[:LEGS] < 0.7) | (z[:LEGS] > 0.02)), 1)
-        near = ground.near[self.cell(data.geom_xpos[self._spheres[:LEGS], :2])]
+        raised = jnp.any(on[:LEG_SPHERES] & ((up[:LEG_SPHERES] < 0.7) | (z[:LEG_SPHERES] > 0.02)), 1)
+        near = ground.near[self.cell(data.geom_xpos[self._spheres[:LEG_SPHERES], :2])]
         block, wall, touch = raised & ((near & 1) > 0), raised & (near == 2), jnp.any(on, 1)
         foot_block, shank_block = block[:FEET], _by_leg(block[FEET:])
         if self._has_blocks:
@@ -314,9 +319,9 @@ class Simulation:
             shank_block = shank_block | beside
         return Contacts(
             foot=touch[:FEET],
-            shank=_by_leg(touch[FEET:LEGS]),
-            trunk=jnp.any(touch[LEGS:]),
-            trunk_down=jnp.any(on[LEGS:] & (up[LEGS:] > 0.5)),
+            shank=_by_leg(touch[FEET:LEG_SPHERES]),
+            trunk=jnp.any(touch[LEG_SPHERES:]),
+            trunk_down=jnp.any(on[LEG_SPHERES:] & (up[LEG_SPHERES:] > 0.5)),
             foot_block=foot_block,
             shank_block=shank_block,
             foot_wall=wall[:FEET],
@@ -324,7 +329,7 @@ class Simulation:
             crossing=jnp.any(contact.dist[self._leg_rows] < 0),
         )
 
-    def _at_blocks(self, ground: Ground, data: mjx.Data) -> tuple[Float[Array, "4"], Bool[Array, "4"]]:
+    def _at_blocks(self, ground: DeviceGround, data: mjx.Data) -> tuple[Float[Array, "4"], Bool[Array, "4"]]:
         """By geometry: how far the middles of one robot's feet are from the blocks [m], and which of its shanks touch
         one, anywhere along their length."""
         line = data.xpos[self._calves, None] + jnp.einsum("lij,kj->lki", data.xmat[self._calves], SHANK_LINE)

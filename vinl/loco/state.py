@@ -16,7 +16,7 @@ from vinl.loco.walking import Walk, start_walk
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
 
 
-class State(NamedTuple):
+class EnvState(NamedTuple):
     """Everything that changes, one row a robot. It is saved with every checkpoint.
 
     Attributes:
@@ -91,7 +91,7 @@ class FirstKeys(NamedTuple):
 
 
 class Episode(NamedTuple):
-    """What begins with an episode: fields of ``State``."""
+    """What begins with an episode: fields of ``EnvState``."""
 
     body: Body
     targets: Float[Array, "n past 12"]
@@ -158,7 +158,7 @@ def begin_episode(
     )
 
 
-def first_state(config: LocoConfig, starts: Float[Array, "levels columns 3"], key: Array) -> State:
+def first_state(config: LocoConfig, starts: Float[Array, "levels columns 3"], key: Array) -> EnvState:
     """All robots at the start of a training, each a random while into its episode.
 
     Args:
@@ -172,7 +172,7 @@ def first_state(config: LocoConfig, starts: Float[Array, "levels columns 3"], ke
     column = (jnp.arange(n) % c.terrain.columns).astype(jnp.int32)
     command, left = draw_commands(c.commands, keys.command, n)
     start = begin_episode(c, starts, level, column, keys.episode)
-    state = State(
+    state = EnvState(
         key=keys.state,
         body=start.body,
         action=jnp.zeros((n, 12)),
@@ -198,6 +198,6 @@ def first_state(config: LocoConfig, starts: Float[Array, "levels columns 3"], ke
     return strip_weak_types(state)
 
 
-def strip_weak_types(state: State) -> State:
+def strip_weak_types(state: EnvState) -> EnvState:
     """No weak types: with them the step would compile twice."""
     return jax.tree.map(lambda x: x.astype(x.dtype), state)

@@ -48,23 +48,18 @@ def describe_student_figures(row: dict[str, float]) -> dict[str, str]:
 
 def build_student(config: StudentConfig, teacher: StepActor, gait: GaitConfig) -> SteppingActor:
     """A fresh student in front of a teacher's actor and planner."""
-    net, camera = config.network, config.camera
+    sizes, camera = asdict(config.network), config.camera
+    remember = sizes.pop("remember")
     student = SteppingActor(
-        vision=net.vision,
         height=camera.height,
         width=camera.width,
-        visual=net.visual,
-        hidden=net.hidden,
-        layers=net.layers,
-        memory=net.memory,
-        planes=net.planes,
-        code=net.code,
         actor=teacher.arguments["actor"],
         actions=teacher.arguments["actions"],
         gait=asdict(gait),
+        **sizes,
     )
-    if net.remember:
-        student.memory.spread_memory(net.remember)
+    if remember:
+        student.memory.spread_memory(remember)
     return student
 
 
@@ -128,9 +123,9 @@ def train_student(
         )
         save_policy(run.policy, policy, card)
 
-    def schedule(learner: Distillation, share: float) -> None:
-        learner.learning_rate = settings.distillation.rate_at(share)
-        learner.teacher_share = settings.distillation.teacher_share_at(share)
+    def schedule(learner: Distillation, fraction: float) -> None:
+        learner.learning_rate = settings.distillation.rate_at(fraction)
+        learner.teacher_fraction = settings.distillation.teacher_fraction_at(fraction)
         # the first iteration compiles: it would tell nothing
         stopwatch.running = loop.current_learning_iteration % PROFILE_EVERY == 1
 

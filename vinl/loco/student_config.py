@@ -16,7 +16,7 @@ MAX_DELAY = 0.04
 """An image comes at most this late [s]: two control steps."""
 
 
-def _check_share(name: str, value: float) -> None:
+def _check_fraction(name: str, value: float) -> None:
     if not 0 <= value <= 1:
         raise InputError(f"{name} must lie between 0 and 1, got {value}")
 
@@ -100,8 +100,8 @@ class SightConfig:
         angle: largest error of its roll, pitch and yaw [rad].
         zoom: largest relative error of the tangent of half the field of view.
         scale: largest relative error of all depths of an image.
-        noise: standard deviation of each pixel's depth, as a share of the depth.
-        holes: largest share of the image that is missing; each episode draws its own up to this.
+        noise: standard deviation of each pixel's depth, as a fraction of the depth.
+        holes: largest fraction of the image that is missing; each episode draws its own up to this.
         hole_size: side of the squares that are missing [pixels].
         hole_reads: what a missing pixel reads: ``far`` or ``zero``.
         delay: range of the time by which every image of an episode is late [s], up to 0.04; in control steps, to the
@@ -122,7 +122,7 @@ class SightConfig:
         if min(self.position, self.angle, self.noise) < 0:
             raise InputError("student.sight: position, angle and noise must not be negative")
         for name in ("zoom", "scale", "holes"):
-            _check_share(f"student.sight.{name}", getattr(self, name))
+            _check_fraction(f"student.sight.{name}", getattr(self, name))
         if not 0 <= self.delay[0] <= self.delay[1] <= MAX_DELAY:
             raise InputError(f"student.sight.delay must lie between 0 and {MAX_DELAY} s, got {list(self.delay)}")
         if self.hole_size < 1:
@@ -141,7 +141,7 @@ class DistillationConfig:
         epochs, minibatches: passes over a roll-out and parts of each; a part holds all steps of some robots.
         velocity_weight, code_weight: of the errors of the velocity and of the code.
         learning_rate, last_learning_rate: of Adam, at the start and at the end; a cosine between them.
-        warmup: share of the iterations in which the rate rises from zero.
+        warmup: fraction of the iterations in which the rate rises from zero.
         max_grad_norm: gradients are clipped to this norm.
         teacher_share: fraction of the robots that walk by what is true at the start; 0 is the paper's.
         teacher_until: fraction of the iterations after which none does.
@@ -172,17 +172,17 @@ class DistillationConfig:
         if min(self.velocity_weight, self.code_weight) < 0:
             raise InputError("student.distillation: the weights must not be negative")
         for name in ("teacher_share", "teacher_until", "warmup"):
-            _check_share(f"student.distillation.{name}", getattr(self, name))
+            _check_fraction(f"student.distillation.{name}", getattr(self, name))
 
-    def rate_at(self, share: float) -> float:
-        """The learning rate after a share of the iterations."""
-        rise = min((share + 1e-3) / self.warmup, 1.0) if self.warmup > 0 else 1.0
-        wave = 0.5 * (1 + math.cos(math.pi * min(share, 1.0)))
+    def rate_at(self, fraction: float) -> float:
+        """The learning rate after a fraction of the iterations."""
+        rise = min((fraction + 1e-3) / self.warmup, 1.0) if self.warmup > 0 else 1.0
+        wave = 0.5 * (1 + math.cos(math.pi * min(fraction, 1.0)))
         return rise * (self.last_learning_rate + wave * (self.learning_rate - self.last_learning_rate))
 
-    def teacher_share_at(self, share: float) -> float:
-        """The share of robots that the teacher drives after a share of the iterations."""
-        return self.teacher_share * max(1 - share / self.teacher_until, 0.0) if self.teacher_until > 0 else 0.0
+    def teacher_fraction_at(self, fraction: float) -> float:
+        """The fraction of robots that the teacher drives after a fraction of the iterations."""
+        return self.teacher_share * max(1 - fraction / self.teacher_until, 0.0) if self.teacher_until > 0 else 0.0
 
 
 @dataclass(frozen=True)

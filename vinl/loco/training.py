@@ -12,16 +12,16 @@ import torch
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config, dump_config
 from vinl.gait.observation import STEPPING_TABLE
-from vinl.loco.config import LocoConfig, PpoConfig
+from vinl.loco.config import LocoConfig, LocoPpoConfig
 from vinl.loco.environment import LocoEnvironment
+from vinl.loco.models import MapModel, StepModel, training_names
+from vinl.loco.runner import TrainingRunner
 from vinl.loco.vec_env import LocoVecEnv
 from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.commit import find_commit
 from vinl.policies.io import save_policy
-from vinl.rl.models import MapModel, StepModel, training_names
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
-from vinl.rl.runner import TrainingRunner
 
 WARMUP_RATE = 1e-3
 """Learning rate while only the critic learns."""
@@ -30,13 +30,13 @@ WARMUP_RATE = 1e-3
 def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
     """Our PPO settings under rsl-rl's names."""
     p = config.ppo
-    sight: dict[str, Any] = {"class_name": "vinl.rl.models:StepModel"}
+    sight: dict[str, Any] = {"class_name": "vinl.loco.models:StepModel"}
     if p.scan:
-        sight = {"class_name": "vinl.rl.models:MapModel", "encoder": list(p.encoder), "code": p.code}
+        sight = {"class_name": "vinl.loco.models:MapModel", "encoder": list(p.encoder), "code": p.code}
     sight["proprioception"] = STEPPING_TABLE.size
     update: dict[str, Any] = {"class_name": "PPO"}
     if p.update != "rsl_rl":
-        update = {"class_name": "vinl.rl.fast_ppo:FastPPO", "graphs": p.update == "graphs"}
+        update = {"class_name": "vinl.loco.fast_ppo:FastPPO", "graphs": p.update == "graphs"}
     return {
         "num_steps_per_env": p.steps,
         "obs_groups": {"actor": ["policy"], "critic": ["critic"]},
@@ -44,7 +44,7 @@ def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
             **sight,
             "hidden_dims": list(p.actor),
             "activation": "elu",
-            "distribution_cfg": {"class_name": "vinl.rl.models:UncheckedGaussian", "init_std": p.init_std},
+            "distribution_cfg": {"class_name": "vinl.loco.models:UncheckedGaussian", "init_std": p.init_std},
         },
         "critic": {"class_name": "MLPModel", "hidden_dims": list(p.critic), "activation": "elu"},
         "algorithm": {
@@ -138,13 +138,13 @@ def train_locomotor(
         card = make_card(name or run.path.name, config, actor.describe(), samples, commit, origin)
         save_policy(run.policy, actor, card)
 
-    def schedule(algorithm: Any, share: float) -> None:
+    def schedule(algorithm: Any, fraction: float) -> None:
         teach_critic_first(algorithm, runner.current_learning_iteration, config.ppo)
-        environment.set_rewards(config.anneal.rewards_at(share, config.rewards))
-        environment.set_noise(config.randomisation.noise_at(share))
-        environment.simulation.set_solid(share >= config.terrain.ghost)
+        environment.set_rewards(config.anneal.rewards_at(fraction, config.rewards))
+        environment.set_noise(config.randomisation.noise_at(fraction))
+        environment.simulation.set_solid(fraction >= config.terrain.ghost)
         if config.anneal.entropy is not None:
-            algorithm.entropy_coef = config.anneal.blend(share, config.ppo.entropy, config.anneal.entropy)
+            algorithm.entropy_coef = config.anneal.blend(fraction, config.ppo.entropy, config.anneal.entropy)
 
     runner = TrainingRunner(env, rsl_rl_settings(config), run, device, export, describe_figures, schedule, save_every)
     if start is not None:
@@ -154,7 +154,7 @@ def train_locomotor(
     return runner.train(iterations or config.iterations, minutes)
 
 
-def teach_critic_first(algorithm: Any, iteration: int, ppo: PpoConfig) -> None:
+def teach_critic_first(algorithm: Any, iteration: int, ppo: LocoPpoConfig) -> None:
     """Hold the actor still during ``critic_warmup`` and let it go afterwards; called before every iteration."""
     if not ppo.critic_warmup or iteration > ppo.critic_warmup:
         return

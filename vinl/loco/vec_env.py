@@ -14,7 +14,7 @@ from tensordict import TensorDict
 
 from vinl.gait.state import GaitState
 from vinl.loco.environment import LocoEnvironment, Observations, StepResult
-from vinl.loco.state import State
+from vinl.loco.state import EnvState
 
 _LENT = 8
 """How many steps lent arrays are kept alive: the two libraries run on streams of their own, and neither may reuse
@@ -120,7 +120,7 @@ class LocoVecEnv(VecEnv):
         return torch.from_dlpack(x) if self._on_gpu else torch.from_numpy(np.array(x))
 
 
-def _by_name(state: State) -> dict[str, jax.Array]:
+def _by_name(state: EnvState) -> dict[str, jax.Array]:
     """The arrays of a state, in their order, by the names of its fields joined by dots."""
     paths = jax.tree_util.tree_flatten_with_path(state)[0]
     return {".".join(part.name for part in path): leaf for path, leaf in paths}  # type: ignore[attr-defined]

@@ -26,7 +26,7 @@ from vinl.gait.state import (
     velocity_in_heading_frame,
 )
 from vinl.loco.rewards import MIDDLE
-from vinl.loco.simulation import SHANK_REACH, Body, Ground
+from vinl.loco.simulation import SHANK_REACH, Body, DeviceGround
 from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS
 from vinl.world.grid import GridFrame
 
@@ -76,7 +76,7 @@ def start_walk(config: GaitConfig, body: Body) -> Walk:
 
 def go_on(
     config: GaitConfig,
-    ground: Ground,
+    ground: DeviceGround,
     frame: GridFrame,
     walk: Walk,
     before: Body,
@@ -129,7 +129,7 @@ def _leg_gap(view: FieldView, body: Body, feet: Float[Array, "n 4 3"]) -> Float[
 
 
 def local_heights(
-    config: GaitConfig, ground: Ground, frame: GridFrame, gait: GaitState, body: Body
+    config: GaitConfig, ground: DeviceGround, frame: GridFrame, gait: GaitState, body: Body
 ) -> Float[Array, "n 741"]:
     """The ground about every robot at ``local_map.POINTS``, above the floor under the feet that stand [m]."""
     feet = feet_in_heading_frame(jnp, body.qpos)

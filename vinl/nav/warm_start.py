@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import torch
 from safetensors import SafetensorError
@@ -23,20 +25,17 @@ CRITIC = "critic.safetensors"
 
 def build_actor(config: NavConfig) -> NavActor:
     """A navigator with fresh weights."""
-    c, n = config.camera, config.network
+    camera = config.camera
+    image: dict[str, Any] = {"vision": "none", "height": 1, "width": 1}
+    if camera is not None:
+        image = {"height": camera.height, "width": camera.width, "channels": 2 if camera.missing == "plane" else 1}
     return NavActor(
-        vision=n.vision if c is not None else "none",
-        height=c.height if c is not None else 1,
-        width=c.width if c is not None else 1,
-        visual=n.visual,
-        embedding=n.embedding,
-        hidden=n.hidden,
-        layers=n.layers,
-        memory=n.memory,
-        planes=n.planes,
-        previous=PREVIOUS_SIZE * (2 if config.previous == "both" else 1),
-        places=_map_geometry(config).describe() if n.places else None,
-        channels=2 if c is not None and c.missing == "plane" else 1,
+        **{
+            **asdict(config.network),
+            **image,
+            "previous": PREVIOUS_SIZE * (2 if config.previous == "both" else 1),
+            "places": _map_geometry(config).describe() if config.network.places else None,
+        }
     )
 
 

@@ -56,21 +56,7 @@ class DepthActor(PolicyNetwork):
         """Sizes as in ``DepthMemory``; ``actor`` are the widths of the actor's hidden layers, the teacher's; ``code``
         is without the detour."""
         super().__init__()
-        self.arguments = {
-            "vision": vision,
-            "height": height,
-            "width": width,
-            "visual": visual,
-            "hidden": hidden,
-            "layers": layers,
-            "memory": memory,
-            "planes": planes,
-            "proprioception": proprioception,
-            "code": code,
-            "actor": list(actor),
-            "actions": actions,
-            **({"detour": True} if detour else {}),  # cards from before there were detours lack it
-        }
+        self.keep_arguments(locals())
         self.observation_size, self.action_size, self.detour = proprioception, actions, detour
         self.code = code + 2 * detour
         # No weight, but on the device: to copy it there at every step would be to wait for the device. It has its

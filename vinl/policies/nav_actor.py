@@ -63,20 +63,7 @@ class NavActor(PolicyNetwork):
     ) -> None:
         super().__init__()
         self.observation_size = GOAL_SIZE + previous
-        self.arguments = {
-            "vision": vision,
-            "height": height,
-            "width": width,
-            "visual": visual,
-            "embedding": embedding,
-            "hidden": hidden,
-            "layers": layers,
-            "memory": memory,
-            "planes": planes,
-            "previous": previous,
-            "channels": channels,
-            **({} if places is None else {"places": places}),
-        }
+        self.keep_arguments(locals())
         self.goal = nn.Linear(GOAL_SIZE, embedding)
         self.previous = nn.Linear(previous, embedding)
         self.geometry = None if places is None else MapGeometry(**places)

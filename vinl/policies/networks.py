@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Sequence
+from inspect import signature
 from itertools import pairwise
 from typing import Any
 
@@ -43,6 +44,18 @@ class PolicyNetwork(nn.Module):
         super().__init_subclass__(**kwargs)
         NETWORKS[cls.__name__] = cls
 
+    def keep_arguments(self, local: dict[str, Any]) -> None:
+        """Keep what the constructor was called with.
+
+        Args:
+            local: ``locals()`` at its start. What is None or False is left out: cards from before it existed lack it.
+        """
+        self.arguments = {
+            name: list(value) if isinstance(value, list | tuple) else value
+            for name in signature(type(self)).parameters
+            if (value := local[name]) is not None and value is not False
+        }
+
     def describe(self) -> dict[str, Any]:
         """What ``build_network`` needs: the class name and the constructor's arguments, as plain data."""
         return {"class": type(self).__name__, **self.arguments}
@@ -66,14 +79,7 @@ class MapActor(PolicyNetwork):
     ) -> None:
         """Sizes of the parts; ``encoder`` and ``actor`` are the widths of the hidden layers."""
         super().__init__()
-        self.arguments = {
-            "proprioception": proprioception,
-            "scan": scan,
-            "encoder": list(encoder),
-            "code": code,
-            "actor": list(actor),
-            "actions": actions,
-        }
+        self.keep_arguments(locals())
         self.proprioception = proprioception
         self.observation_size, self.action_size = proprioception + scan, actions
         self.encoder = mlp([scan, *encoder, code], nn.ReLU)
@@ -97,7 +103,7 @@ class BlindActor(PolicyNetwork):
     ) -> None:
         """Sizes of the parts; ``actor`` are the widths of the hidden layers, ``scan`` numbers are left out."""
         super().__init__()
-        self.arguments = {"proprioception": proprioception, "scan": scan, "actor": list(actor), "actions": actions}
+        self.keep_arguments(locals())
         self.proprioception = proprioception
         self.observation_size, self.action_size = proprioception + scan, actions
         self.actor = mlp([proprioception, *actor, actions], nn.ELU)
@@ -116,7 +122,7 @@ class StepActor(PolicyNetwork):
     def __init__(self, proprioception: int, actor: Sequence[int] = (512, 256, 128), actions: int = 12) -> None:
         """``proprioception`` counts the rows of the gait too; ``actor`` are the widths of the hidden layers."""
         super().__init__()
-        self.arguments = {"proprioception": proprioception, "actor": list(actor), "actions": actions}
+        self.keep_arguments(locals())
         self.observation_size, self.action_size = proprioception, actions
         self.actor = mlp([proprioception, *actor, actions], nn.ELU)
 

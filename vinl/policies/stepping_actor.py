@@ -106,21 +106,9 @@ class SteppingActor(PolicyNetwork):
         super().__init__()
         if code not in CODES:
             raise ValueError(f"code is one of {CODES}, got {code!r}")
-        self.arguments = {
-            "vision": vision,
-            "height": height,
-            "width": width,
-            "visual": visual,
-            "hidden": hidden,
-            "layers": layers,
-            "memory": memory,
-            "planes": planes,
-            "code": code,
-            "actor": list(actor),
-            "actions": actions,
-            "gait": dict(gait or {}),
-        }
-        self.gait = build_config(GaitConfig, dict(gait or {}), source="network: gait")
+        gait = dict(gait or {})
+        self.keep_arguments(locals())
+        self.gait = build_config(GaitConfig, gait, source="network: gait")
         self.observation_size, self.action_size = SENSED_TABLE.size, actions
         self.code, self.code_size = code, PLAN_SIZE if code == "plan" else len(POINTS)
         self.vector_size = SENSED_TABLE.size + 8 + 3

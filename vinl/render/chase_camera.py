@@ -56,11 +56,11 @@ class ChaseCamera:
         if self._renderer is None:
             return self._elevation, self._distance
         side = 0.2 * np.array([-math.sin(yaw), math.cos(yaw), 0.0])
-        for share in (1.0, 0.75):
+        for fraction in (1.0, 0.75):
             for elevation in np.linspace(self._elevation, math.radians(78), 6):
-                eye = self._eye(target, yaw, elevation, share * self._distance)
+                eye = self._eye(target, yaw, elevation, fraction * self._distance)
                 if all(self._renderer.sees(eye, target + shift) for shift in (side, -side)):
-                    return float(elevation), share * self._distance
+                    return float(elevation), fraction * self._distance
         return math.radians(85), self._distance
 
     @staticmethod

@@ -10,7 +10,7 @@ import torch
 
 from vinl.rl.run_folder import LOST, RunFolder
 
-MAX_SHARE = 1e-3
+MAX_FRACTION = 1e-3
 """More than this fraction of an iteration's robot steps ends the training; a single one never does."""
 
 
@@ -50,7 +50,7 @@ def judge_losses(
         for state in env.take_lost():
             folder.save_lost({**state, "iteration": iteration})
             reasons[state["reason"]] = reasons.get(state["reason"], 0) + 1
-    if count <= max(1.0, MAX_SHARE * robot_steps):
+    if count <= max(1.0, MAX_FRACTION * robot_steps):
         return None
     causes = f" ({', '.join(sorted(reasons, key=lambda name: -reasons[name]))})" if reasons else ""
     where = folder.path / LOST

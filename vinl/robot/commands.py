@@ -41,9 +41,9 @@ class CommandConfig:
                 raise InputError(f"commands.{name} must be a rising range, got {low} to {high}")
         if self.hold[0] <= 0:
             raise InputError(f"commands.hold must be positive, got {self.hold[0]}")
-        shares = self.stand_share, self.turn_share
-        if min(shares) < 0 or sum(shares) > 1:
-            raise InputError("commands: stand_share and turn_share must be shares that add up to at most 1")
+        fractions = self.stand_share, self.turn_share
+        if min(fractions) < 0 or sum(fractions) > 1:
+            raise InputError("commands: stand_share and turn_share must be fractions that add up to at most 1")
 
 
 UNIFORM = ("forward", "left", "yaw_rate", "kind", "hold")

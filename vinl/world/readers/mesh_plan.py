@@ -21,7 +21,7 @@ LEVEL = 0.96
 FLOOR_AREA = 2.0
 """Least floor at one height [m2]."""
 
-FLOOR_SHARE = 0.25
+FLOOR_FRACTION = 0.25
 """The floor is the lowest height with at least this fraction of what the height with the most level surface has."""
 
 BIN = 0.05
@@ -139,7 +139,7 @@ def _find_floor(triangles: Float[np.ndarray, "f 3 3"], file: Path, up: str) -> f
         areas = np.bincount(bins, area[level])
         pooled = areas + np.append(areas[1:], 0.0)  # a floor on the edge of two bins counts once
         best = max(best, float(pooled.max()))
-        high = np.flatnonzero((pooled >= FLOOR_AREA) & (pooled >= FLOOR_SHARE * pooled.max()))
+        high = np.flatnonzero((pooled >= FLOOR_AREA) & (pooled >= FLOOR_FRACTION * pooled.max()))
         if len(high):
             there = (bins >= high[0]) & (bins <= high[0] + 1)
             return float(np.average(z[level][there], weights=area[level][there]))

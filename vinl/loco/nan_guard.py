@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from vinl.loco.simulation import PAST
-from vinl.loco.state import State
+from vinl.loco.state import EnvState
 
 KEPT = 16
 """How many states are kept until they are taken; later ones are only counted."""
@@ -73,7 +73,7 @@ class Lost(NamedTuple):
 def keep_lost(
     lost: Lost,
     wrong: Bool[Array, "reasons n"],
-    state: State,
+    state: EnvState,
     action: Float[Array, "n 12"],
     targets: Float[Array, "n past 12"],
     delay: Int[Array, " n"],

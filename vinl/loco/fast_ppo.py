@@ -3,7 +3,7 @@
 rsl-rl reads the divergence from the device at every minibatch to choose the learning rate, and three losses after it;
 its optimiser launches a kernel for each weight. Here the rate lies on the device, losses are added up there and read
 once, the optimiser is one kernel, and on request whole minibatches are one CUDA graph. To use it, name
-``vinl.rl.fast_ppo:FastPPO`` as ``class_name`` of rsl-rl's ``algorithm``.
+``vinl.loco.fast_ppo:FastPPO`` as ``class_name`` of rsl-rl's ``algorithm``.
 """
 
 from __future__ import annotations

@@ -11,8 +11,8 @@ from rsl_rl.env import VecEnv
 from rsl_rl.modules.distribution import GaussianDistribution
 from tensordict import TensorDict
 
-from vinl.rl.fast_ppo import FastPPO
-from vinl.rl.models import UncheckedGaussian
+from vinl.loco.fast_ppo import FastPPO
+from vinl.loco.models import UncheckedGaussian
 
 N, STEPS, SIZE, ACTIONS = 16, 6, 5, 3
 
@@ -84,7 +84,7 @@ def assert_same_weights(a, b):
 )
 def test_it_learns_what_rsl_rl_learns(more):
     env_a, env_b = NoiseEnv(), NoiseEnv()
-    a, b = build("PPO", env_a, **more), build("vinl.rl.fast_ppo:FastPPO", env_b, **more)
+    a, b = build("PPO", env_a, **more), build("vinl.loco.fast_ppo:FastPPO", env_b, **more)
     assert type(b) is FastPPO
     for one, two in zip(learn(a, env_a, 3), learn(b, env_b, 3), strict=True):
         assert two == pytest.approx(one, rel=1e-3, abs=1e-5)
@@ -93,7 +93,7 @@ def test_it_learns_what_rsl_rl_learns(more):
 
 def test_a_schedule_may_move_rate_divergence_and_entropy():
     env_a, env_b = NoiseEnv(), NoiseEnv()
-    a, b = build("PPO", env_a), build("vinl.rl.fast_ppo:FastPPO", env_b)
+    a, b = build("PPO", env_a), build("vinl.loco.fast_ppo:FastPPO", env_b)
     for algorithm, env in ((a, env_a), (b, env_b)):
         learn(algorithm, env, 1)
         algorithm.desired_kl, algorithm.learning_rate, algorithm.entropy_coef = None, 2e-3, 0.0
@@ -111,9 +111,9 @@ def test_a_schedule_may_move_rate_divergence_and_entropy():
 
 def test_either_goes_on_from_the_others_state():
     env_a, env_b = NoiseEnv(), NoiseEnv()
-    slow, fast = build("PPO", env_a), build("vinl.rl.fast_ppo:FastPPO", env_b)
+    slow, fast = build("PPO", env_a), build("vinl.loco.fast_ppo:FastPPO", env_b)
     learn(slow, env_a, 2), learn(fast, env_b, 2)
-    crossed_slow, crossed_fast = build("PPO", NoiseEnv()), build("vinl.rl.fast_ppo:FastPPO", NoiseEnv())
+    crossed_slow, crossed_fast = build("PPO", NoiseEnv()), build("vinl.loco.fast_ppo:FastPPO", NoiseEnv())
     crossed_fast.load(copy.deepcopy(slow.save()), None, True)
     crossed_slow.load(copy.deepcopy(fast.save()), None, True)
     learn(crossed_slow, env_a, 1), learn(crossed_fast, env_b, 1)
@@ -123,7 +123,7 @@ def test_either_goes_on_from_the_others_state():
 
 def test_what_it_does_not_know_is_refused():
     with pytest.raises(ValueError, match="mixed precision"):
-        build("vinl.rl.fast_ppo:FastPPO", NoiseEnv(), use_mixed_precision=True)
+        build("vinl.loco.fast_ppo:FastPPO", NoiseEnv(), use_mixed_precision=True)
 
 
 def test_actions_are_drawn_as_rsl_rl_draws_them():
