@@ -1,6 +1,7 @@
 """What a notebook says in one line: plans with clutter, a walk, its pictures and its film."""
 
 import gc
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -136,10 +137,12 @@ def test_a_bar_is_shown_to_those_who_watch(monkeypatch: pytest.MonkeyPatch, caps
     vinl.walk(PLAN, "rough", "oracle", config=rules)
     assert capsys.readouterr().err == ""
     monkeypatch.setattr(progress_line, "is_watched", lambda: True)
+    monkeypatch.setenv("FORCE_COLOR", "1")
     vinl.walk(PLAN, "rough", "oracle", config=rules)
     bar = capsys.readouterr().err
-    assert "walking:" in bar and "1 s" in bar and "left" in bar
-    assert max(map(len, bar.split("\r"))) <= 80
+    shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", bar).split("\r")
+    assert any("walking:" in line and "/1 s" in line and "left" in line for line in shown)
+    assert max(len(line.rstrip("\n")) for line in shown) <= 80
 
 
 def test_part_of_an_episode(walk: vinl.Walk) -> None:

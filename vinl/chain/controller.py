@@ -116,7 +116,7 @@ def open_controller(
 ) -> LocomotionController:
     """The controller of robots in a floor plan, each with its own clutter, see ``open_depth_cameras``; ``errors`` are
     those of their cameras."""
-    scan = ScanReader(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
+    scan = ScanReader.on_plan(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
     cameras = None if locomotor.camera is None else open_depth_cameras(plan, blocks, locomotor.camera, ceiling)
     config = find_gait(locomotor.card)
     gait = None if config is None else GaitReader(config, map_plan(plan, blocks))

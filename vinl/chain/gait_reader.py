@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from vinl.chain.scan_reader import Stack, raise_blocks
 from vinl.gait.config import GaitConfig
 from vinl.gait.footholds import plan_footholds
 from vinl.gait.ground_view import FieldView, GroundMap, build_ground_map
@@ -25,7 +26,7 @@ from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 from vinl.world.grid import GridFrame
-from vinl.world.heightfield import BLOCK, flat_field, raise_boxes
+from vinl.world.heightfield import flat_field
 
 RIM = 2.0
 """Level ground around a plan [m]: no robot looks into the map of another episode."""
@@ -42,31 +43,22 @@ class GaitMaps:
     """
 
     def __init__(self, maps: Sequence[GroundMap], frame: GridFrame) -> None:
-        rows, columns = frame.shape
         self.ground = GroundMap(*(np.concatenate(grids) for grids in zip(*maps, strict=True)))
-        self.frame = GridFrame(frame.x0, frame.y0, frame.resolution, (len(maps) * rows, columns))
-        self._shift = np.arange(len(maps)) * rows * frame.resolution
+        self._stack = Stack(frame, len(maps))
 
     def view(self, qpos: Float[np.ndarray, "n 19"]) -> FieldView:
         """The ground as each robot sees it."""
-        at = qpos[:, :7].copy()
-        at[:, 1] += self._shift
-        return FieldView(np, self.ground, self.frame, at)
+        return FieldView(np, self.ground, self._stack.frame, self._stack.place(qpos[:, :7]))
 
 
 def map_plan(plan: FloorPlan, blocks: Sequence[Blocks]) -> GaitMaps:
     """Maps of a floor plan with the clutter of each episode."""
-    r, rim = plan.frame.resolution, round(RIM / plan.frame.resolution)
-    rows, columns = plan.frame.shape
-    frame = GridFrame(plan.frame.x0 - rim * r, plan.frame.y0 - rim * r, r, (rows + 2 * rim, columns + 2 * rim))
-    solid = plan.boxes[plan.boxes.rows[:, 5] < BODY_HEIGHT] if len(plan.boxes) else plan.boxes
-    different = blocks if any(len(b) for b in blocks) else blocks[:1]
-    maps = []
-    for some in different:
-        field, clutter = flat_field(frame), some.boxes()
-        raise_boxes(field, clutter, BLOCK)
-        maps.append(build_ground_map(field.heights, frame, solid + clutter))
-    return GaitMaps(maps, frame)
+    fields = raise_blocks(flat_field(plan.frame.widen(round(RIM / plan.frame.resolution))), blocks)
+    maps = [
+        build_ground_map(field.heights, field.frame, plan.boxes.below(BODY_HEIGHT) + some.boxes())
+        for field, some in zip(fields, blocks, strict=False)
+    ]
+    return GaitMaps(maps, fields[0].frame)
 
 
 def map_ground(heights: Float[np.ndarray, "rows columns"], frame: GridFrame, boxes: Boxes) -> GaitMaps:

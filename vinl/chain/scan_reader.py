@@ -16,72 +16,74 @@ from vinl.world.grid import GridFrame
 from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
 
 
-def rasterise_plan(plan: FloorPlan, reach: float = SCAN_RADIUS) -> HeightField:
-    """Walls and furniture as heights on the plan's grid; what hangs above the robot leaves the floor free.
+def raise_blocks(bare: HeightField, blocks: Sequence[Blocks]) -> list[HeightField]:
+    """The ground of each episode with its blocks; one for all where no episode has any."""
+    if not any(len(some) for some in blocks):
+        return [bare]
+    fields = [HeightField(bare.heights.copy(), bare.labels.copy(), bare.frame) for _ in blocks]
+    for field, some in zip(fields, blocks, strict=True):
+        raise_boxes(field, some.boxes(), BLOCK)
+    return fields
 
-    Level ground lies around them, as wide as robots look from where they are [m]: none reads a neighbour's grid.
+
+class Stack:
+    """Grids of n robots, or one for all, as one grid along y.
+
+    Args:
+        frame: of each.
+        count: of grids.
+
+    Attributes:
+        frame: of all together.
     """
-    rim = int(np.ceil(reach / plan.frame.resolution)) + 1
-    shape = (plan.frame.shape[0] + 2 * rim, plan.frame.shape[1] + 2 * rim)
-    r = plan.frame.resolution
-    field = flat_field(GridFrame(plan.frame.x0 - rim * r, plan.frame.y0 - rim * r, r, shape))
-    boxes = plan.boxes
-    if len(boxes):
-        raise_boxes(field, boxes[boxes.rows[:, 5] < BODY_HEIGHT], WALL)
-    return field
+
+    def __init__(self, frame: GridFrame, count: int) -> None:
+        rows, columns = frame.shape
+        self.frame = GridFrame(frame.x0, frame.y0, frame.resolution, (count * rows, columns))
+        self._shift = np.arange(count) * rows * frame.resolution
+
+    def place(self, qpos: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Poses moved to where each robot's own grid lies."""
+        at = qpos.copy()
+        at[:, 1] += self._shift
+        return at
 
 
 class ScanReader:
     """Reads the height scan of all robots of a unit.
 
-    The grids of the episodes are stacked along y; the look-up of robot k is moved to grid k. Episodes without blocks
-    share one grid.
-
     Args:
-        plan: walls and furniture.
-        blocks: of each episode.
+        fields: one for each robot, or one for all.
         detour: how commands are bent; None: not at all.
     """
 
-    def __init__(
-        self,
-        plan: FloorPlan,
-        blocks: Sequence[Blocks],
-        detour: DetourConfig | None = None,
-    ) -> None:
-        bare = rasterise_plan(plan, max(SCAN_RADIUS, 0.0 if detour is None else detour.reach))
-        if not any(len(b) for b in blocks):
-            self._stack([bare], detour)
-            return
-        fields = [HeightField(bare.heights.copy(), bare.labels.copy(), bare.frame) for _ in blocks]
-        for field, some in zip(fields, blocks, strict=True):
-            raise_boxes(field, some.boxes(), BLOCK)
-        self._stack(fields, detour)
-
-    def _stack(self, fields: Sequence[HeightField], detour: DetourConfig | None) -> None:
-        """One field for each robot, or one for all."""
-        frame = fields[0].frame
-        rows, columns = frame.shape
+    def __init__(self, fields: Sequence[HeightField], detour: DetourConfig | None = None) -> None:
         self._heights = np.concatenate([field.heights for field in fields]).ravel()
-        self._frame = GridFrame(frame.x0, frame.y0, frame.resolution, (len(fields) * rows, columns))
-        self._shift = np.arange(len(fields)) * rows * frame.resolution
+        self._stack = Stack(fields[0].frame, len(fields))
         self._detour = None
         if detour is not None:
             closed = np.concatenate([keep_out(field, detour.margin) for field in fields]).ravel()
             self._detour = closed, detour
 
+    @classmethod
+    def on_plan(cls, plan: FloorPlan, blocks: Sequence[Blocks], detour: DetourConfig | None = None) -> ScanReader:
+        """Of robots in a floor plan, each with its own blocks. Walls and furniture stand as heights on the plan's grid;
+        what hangs above the robot leaves the floor free.
+
+        Level ground lies around them, as wide as robots look from where they are: none reads a neighbour's grid.
+        """
+        reach = max(SCAN_RADIUS, 0.0 if detour is None else detour.reach)
+        field = flat_field(plan.frame.widen(int(np.ceil(reach / plan.frame.resolution)) + 1))
+        raise_boxes(field, plan.boxes.below(BODY_HEIGHT), WALL)
+        return cls(raise_blocks(field, blocks), detour)
+
     def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n points"]:
         """Height of the ground [m] under the scan points of every robot."""
-        return scan_ground(np, self._heights, self._frame, self._on_grid(qpos))
+        return scan_ground(np, self._heights, self._stack.frame, self._stack.place(qpos))
 
     def bend(self, qpos: Float[np.ndarray, "n 19"], command: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """The commands as the locomotor is given them: with detours, if it was trained with such."""
         if self._detour is None:
             return command
         closed, config = self._detour
-        return bend_command(np, closed, self._frame, self._on_grid(qpos), command, config)
-
-    def _on_grid(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 19"]:
-        at = qpos.copy()
-        at[:, 1] += self._shift
-        return at
+        return bend_command(np, closed, self._stack.frame, self._stack.place(qpos), command, config)

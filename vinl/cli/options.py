@@ -117,12 +117,19 @@ def _use_plain_words(options: type[Any]) -> None:
 
 
 def _read_docstrings(options: type[Any]) -> dict[str, str]:
-    """The string under each field as one paragraph: tyro would keep the line breaks of the source."""
-    body = cast(ast.ClassDef, ast.parse(textwrap.dedent(inspect.getsource(options))).body[0]).body
+    """The string under each field as one paragraph: tyro would keep the line breaks of the source. What a class says
+    of a field goes before what its bases say."""
     texts = {}
-    for field, below in pairwise(body):
-        if isinstance(field, ast.AnnAssign) and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
-            texts[cast(ast.Name, field.target).id] = " ".join(str(below.value.value).replace("``", "").split())
+    for part in reversed([kind for kind in options.__mro__ if dataclasses.is_dataclass(kind)]):
+        body = cast(ast.ClassDef, ast.parse(textwrap.dedent(inspect.getsource(part))).body[0]).body
+        for field, below in pairwise(body):
+            if (
+                isinstance(field, ast.AnnAssign)
+                and isinstance(below, ast.Expr)
+                and isinstance(below.value, ast.Constant)
+            ):
+                name, words = cast(ast.Name, field.target).id, str(below.value.value)
+                texts[name] = " ".join(words.replace("``", "").split())
     return texts
 
 

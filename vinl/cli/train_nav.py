@@ -8,20 +8,14 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass
-from typing import Annotated
 
-import tyro
-
-from vinl.cli.loggers import Logger, start_logger
-from vinl.cli.options import Settings, parse_options, settings_first
+from vinl.cli.options import parse_options, settings_first
+from vinl.cli.training import INTERRUPTED, TrainingOptions
 from vinl.config.errors import InputError
-
-INTERRUPTED = 130
-"""Exit code after an interrupt that saved."""
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(TrainingOptions):
     """Train a navigator with PPO in generated homes. The run's folder holds checkpoint, curves and, at any time, the
     policy.
 
@@ -29,35 +23,12 @@ class Options:
     ppo.epochs=1 or motion.amplitude=[0,1].
     """
 
-    overrides: Settings = ()
-    """Settings of the config as key=value."""
-    config: str = "default"
-    """default, blind or paper (shipped configs of nav/), or a YAML file."""
-    from_policy: Annotated[str | None, tyro.conf.arg(name="from")] = None
-    """Start from the network of this navigator (a shipped name or a folder) or run; its sizes must be the config's."""
-    out: str | None = None
-    """Folder of the new run (default: runs/nav-NAME)."""
-    resume: str | None = None
-    """Folder of a run to go on with; its own config is used."""
-    device: str = "auto"
-    """cpu, cuda, or auto: cuda where there is one."""
+    config: str | None = None
+    """default, blind or paper (shipped configs of nav/), or a YAML file; default: default."""
     devices: int = 1
     """GPUs of this machine to train on, each with num_envs robots and homes of its own (on a CPU: processes)."""
-    num_envs: int | None = None
-    """Robots in parallel on each device (default: the config's)."""
-    iterations: int | None = None
-    """Updates in all (default: the config's)."""
-    minutes: float | None = None
-    """The training is over after so many minutes too, and what moves during it keeps to them (default: no limit)."""
     memory: float | None = None
     """Use at most so much memory of each GPU [GB], as on a smaller card (default: all of it). Homes are not counted."""
-    seed: int | None = None
-    """Of everything random but the homes (default: the config's)."""
-    save_every: float = 60.0
-    """Seconds between checkpoints."""
-    logger: Logger = "tensorboard"
-    """Who draws the curves beside the run's own metrics.jsonl: tensorboard (its files are always written), or wandb,
-    which reads along."""
     profile: bool = False
     """Write where the time of the sixth iteration goes to profile.txt in the run's folder."""
 
@@ -65,27 +36,14 @@ class Options:
 def main(argv: list[str]) -> int:
     """Run the command; returns 130 after an interrupt."""
     options = parse_options(Options, settings_first(Options, argv), "train-nav")
-    if options.save_every <= 0:
-        raise InputError(f"--save-every must be positive, got {options.save_every}")
+    options.check()
     if options.devices < 1:
         raise InputError(f"--devices must be at least 1, got {options.devices}")
-    if options.iterations is not None and options.iterations < 1:
-        raise InputError(f"--iterations must be at least 1, got {options.iterations}")
-    if options.minutes is not None and options.minutes <= 0:
-        raise InputError(f"--minutes must be positive, got {options.minutes}")
     if options.memory is not None and options.memory <= 0:
         raise InputError(f"--memory must be positive, got {options.memory}")
-    if options.resume and options.from_policy:
-        raise InputError("--from starts a new run and --resume goes on with an old one; give one of them")
-    fresh = options.overrides or options.config != "default" or options.out or options.num_envs or options.seed
-    if options.resume and fresh:
-        raise InputError(
-            "--resume goes on with the run's own config; only --iterations, --minutes and --device may be given"
-        )
     device = _choose_device(options)
 
     from vinl.cli.kinds import check_config, check_run, check_source
-    from vinl.config.loader import load_config
     from vinl.config.output import check_out
     from vinl.nav.config import NavConfig
     from vinl.rl.out_of_memory import explain_out_of_memory
@@ -96,21 +54,20 @@ def main(argv: list[str]) -> int:
         check_run(folder, "navigation", options.iterations)
         num_envs = int(RunFolder(folder).open().get("num_envs", 0))
     else:
-        short = {"num_envs": options.num_envs, "iterations": options.iterations, "seed": options.seed}
-        overrides = [*options.overrides, *(f"{k}={v}" for k, v in short.items() if v is not None)]
-        check_config(options.config, "navigation")
+        source = options.config or "default"
+        check_config(source, "navigation")
         if options.from_policy is not None:
             check_source(options.from_policy, "navigation")
-        config = load_config(NavConfig, _config_source(options.config), overrides)
+        config = options.read_config(NavConfig, _config_source(source))
         num_envs = config.num_envs
-        folder = options.out or f"runs/nav-{options.config.removesuffix('.yaml').split('/')[-1]}"
+        folder = options.out or f"runs/nav-{source.removesuffix('.yaml').split('/')[-1]}"
     check_out(folder)
     if options.devices > 1 and "RANK" not in os.environ:
         return _start_processes(options.devices, argv)
     from vinl.nav.training import train_navigator
 
     if int(os.environ.get("RANK", "0")) == 0:
-        start_logger(options.logger, folder)
+        options.start_logger(folder)
     with explain_out_of_memory(num_envs):
         complete = train_navigator(
             config,

@@ -10,11 +10,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy import ndimage
 
-from vinl.chain.scan_reader import ScanReader
 from vinl.chain.scene import build_scene
 from vinl.config.errors import InputError
 from vinl.sensing.depth import Mesh
-from vinl.sensing.detour import DetourConfig
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.clutter import draw_litter
@@ -138,13 +136,6 @@ class Ground:
         if self.field.heights.any() and not len(boxes):
             return heightfield_mesh(self.field.heights, self.field.frame)
         return join_meshes(box_mesh(boxes), floor_mesh(_HORIZON))
-
-
-class FieldScanReader(ScanReader):
-    """Reads the height scan of robots that all walk on one height field."""
-
-    def __init__(self, field: HeightField, detour: DetourConfig | None = None) -> None:
-        self._stack([field], detour)
 
 
 def build_ground(config: GroundConfig) -> Ground:

@@ -11,10 +11,11 @@ from vinl.chain.controller import LocomotionController
 from vinl.chain.depth_cameras import DepthCameras
 from vinl.chain.gait_reader import GaitReader, map_ground
 from vinl.chain.metrics import tracking_errors
+from vinl.chain.scan_reader import ScanReader
 from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import Course
 from vinl.courses.gait_metrics import record_gait
-from vinl.courses.grounds import FieldScanReader, Ground
+from vinl.courses.grounds import Ground
 from vinl.courses.herd import Herd
 from vinl.courses.robot_records import FRONT, REAR, RobotRecord
 from vinl.courses.step_counter import StepCounter
@@ -92,7 +93,7 @@ def run_trial(
 
 def controller_on_course(policy: Policy, ground: Ground, n: int) -> LocomotionController:
     """What a policy of n robots observes on a ground that all of them walk on."""
-    scan = FieldScanReader(ground.field, find_detour(policy.card)) if reads_ground(policy.card) else None
+    scan = ScanReader([ground.field], find_detour(policy.card)) if reads_ground(policy.card) else None
     cameras = None if policy.camera is None else DepthCameras([ground.mesh()], [0] * n, policy.camera)
     config = find_gait(policy.card)
     gait = None

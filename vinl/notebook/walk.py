@@ -167,7 +167,7 @@ def walk(
     route = draw_routes(home, episode + 1, rules)[episode]
     setup = draw_setup(home, route, episode, seed, CLUTTER[obstacles], rules)
     decisions = count()
-    with one_thread(), show_line("walking", "s", rules.time_limit) as show:
+    with one_thread(), show_line("walking", "s") as show:
 
         def note() -> bool:
             show(next(decisions) * rules.navigation_period * CONTROL_DT, rules.time_limit)

@@ -27,11 +27,6 @@ _MARGIN = 0.4
 _GRAIN = 0.02
 
 
-def keep_low(boxes: Boxes) -> Boxes:
-    """The boxes that the robot could run into; lintels over doors are not drawn."""
-    return Boxes(boxes.rows[boxes.rows[:, 5] < BODY_HEIGHT])
-
-
 def outline_boxes(boxes: Boxes) -> str:
     """Path data of the footprints [m], y up turned to y down."""
     if not len(boxes):
@@ -88,8 +83,8 @@ def draw_map(plan: FloorPlan, episodes: Sequence[Episode], first: int, radius: f
         f'style="--w:{width / height:.3f}">',
         f'<image href="{draw_floor(plan.inside)}" x="{x[0] - half:.3f}" y="{-y[-1] - half:.3f}" '
         f'width="{x[-1] - x[0] + 2 * half:.3f}" height="{y[-1] - y[0] + 2 * half:.3f}" preserveAspectRatio="none"/>',
-        f'<path class="furniture" d="{outline_boxes(keep_low(plan.furniture))}"/>',
-        f'<path class="wall" d="{outline_boxes(keep_low(plan.walls))}"/>',
+        f'<path class="furniture" d="{outline_boxes(plan.furniture.below(BODY_HEIGHT))}"/>',
+        f'<path class="wall" d="{outline_boxes(plan.walls.below(BODY_HEIGHT))}"/>',
     ]
     for k, episode in enumerate(episodes):
         record, trace = episode.record, episode.trace

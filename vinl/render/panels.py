@@ -10,11 +10,10 @@ from jaxtyping import Float, UInt8
 from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from vinl.chain.records import EpisodeRecord
-from vinl.render.drawing import keep_low
 from vinl.robot.aliengo import LENGTH, WIDTH
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
-from vinl.world.floorplan import FloorPlan
+from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 
 SIZE = (1280, 720)
 """Width and height of a film [pixels]."""
@@ -62,8 +61,8 @@ class MapPanel:
         size = (round(mask.width * 2 * half * self._scale), round(mask.height * 2 * half * self._scale))
         self._image.paste(_FLOOR, tuple(np.rint(corner).astype(int).tolist()), mask.resize(size))
         for boxes, colour in (
-            (keep_low(plan.furniture), _FURNITURE),
-            (keep_low(plan.walls), _WALL),
+            (plan.furniture.below(BODY_HEIGHT), _FURNITURE),
+            (plan.walls.below(BODY_HEIGHT), _WALL),
             (blocks.boxes(), _BLOCK),
         ):
             self._fill(boxes, colour)

@@ -58,6 +58,10 @@ class Boxes:
     def __getitem__(self, index) -> Boxes:
         return Boxes(np.atleast_2d(self.rows[index]))
 
+    def below(self, height: float) -> Boxes:
+        """The boxes that begin below a height [m]."""
+        return self[self.rows[:, 5] < height]
+
     def corners(self) -> Float[np.ndarray, "n 4 2"]:
         """Corners of the footprints [m], counter-clockwise."""
         x, y, yaw, length, width = self.rows[:, :5].T

@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 
 _BATCH = 1024
@@ -68,9 +67,7 @@ def scatter_blocks(
         return Blocks.empty()
     import shapely  # only here: training on generated homes does without
 
-    boxes = plan.boxes
-    low = boxes.rows[boxes.rows[:, 5] < BODY_HEIGHT] if len(boxes) else boxes.rows
-    obstacles = shapely.STRtree(list(map(shapely.Polygon, Boxes(low).corners())))
+    obstacles = shapely.STRtree(list(map(shapely.Polygon, plan.boxes.below(BODY_HEIGHT).corners())))
     placed = np.zeros((0, 6))
     idle = 0
     while len(placed) < wanted and idle < _IDLE_BATCHES:

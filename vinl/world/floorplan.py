@@ -149,8 +149,7 @@ def assemble_floorplan(
     inside = inside[top:bottom, left:right]
     frame = GridFrame(float(x0), float(y0), frame.resolution, (inside.shape[0], inside.shape[1]))
     walls, furniture = _keep_near(walls, frame), _keep_near(furniture, frame)
-    solid = walls + furniture
-    free = inside & ~paint_boxes(solid[solid.rows[:, 5] < BODY_HEIGHT] if len(solid) else solid, frame)
+    free = inside & ~paint_boxes((walls + furniture).below(BODY_HEIGHT), frame)
     if not free.any():
         raise InputError(f"{source}: walls and furniture cover the whole plan; check which pixels are walls")
     if roomy:

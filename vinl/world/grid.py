@@ -41,3 +41,9 @@ class GridFrame:
             self.x0 + np.arange(self.shape[1]) * self.resolution,
             self.y0 + np.arange(self.shape[0]) * self.resolution,
         )
+
+    def widen(self, cells: int) -> GridFrame:
+        """The same grid with so many more cells on each side."""
+        rows, columns = self.shape
+        rim = cells * self.resolution
+        return GridFrame(self.x0 - rim, self.y0 - rim, self.resolution, (rows + 2 * cells, columns + 2 * cells))

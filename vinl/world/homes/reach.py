@@ -45,7 +45,7 @@ def keep_connected(
     Returns:
         ``None`` if the rooms are not connected even without furniture.
     """
-    floor = inside & ~paint_boxes(Boxes(walls.rows[walls.rows[:, 5] < BODY_HEIGHT]), frame)
+    floor = inside & ~paint_boxes(walls.below(BODY_HEIGHT), frame)
     cells = _find_low(pieces, frame)
     windows = [_window(rect, frame) for room in rooms for rect in room.rects]
     owners = [k for k, room in enumerate(rooms) for _ in room.rects]

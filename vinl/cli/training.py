@@ -1,0 +1,95 @@
+"""What ``vinl train-loco`` and ``vinl train-nav`` have in common: options, their checks, and where the curves go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
+
+import tyro
+
+from vinl.cli.options import Settings
+from vinl.config.errors import InputError
+
+if TYPE_CHECKING:
+    from vinl.loco.config import LocoConfig
+    from vinl.nav.config import NavConfig
+
+    AnyConfig = TypeVar("AnyConfig", LocoConfig, NavConfig)
+
+INTERRUPTED = 130
+"""Exit code after an interrupt that saved."""
+
+
+@dataclass(frozen=True)
+class TrainingOptions:
+    """Options of every training."""
+
+    overrides: Settings = ()
+    """Settings of the config as key=value."""
+    config: str | None = None
+    """Name of a shipped config or a YAML file."""
+    from_policy: Annotated[str | None, tyro.conf.arg(name="from")] = None
+    """Start from the networks of this policy (a shipped name or a folder) or run; their sizes must be the config's
+    (default: fresh ones, or what the config names)."""
+    out: str | None = None
+    """Folder of the new run (default: below runs/, by the config's name)."""
+    resume: str | None = None
+    """Folder of a run to go on with; its own config is used."""
+    device: str = "auto"
+    """cpu, cuda, or auto: cuda where there is one."""
+    num_envs: int | None = None
+    """Robots in parallel on each device (default: the config's)."""
+    iterations: int | None = None
+    """Updates in all (default: the config's)."""
+    minutes: float | None = None
+    """The training is over after so many minutes too, and what moves during it keeps to them (default: no limit)."""
+    seed: int | None = None
+    """Of everything random, but for the homes of navigation (default: the config's)."""
+    save_every: float = 60.0
+    """Seconds between checkpoints."""
+    logger: Literal["tensorboard", "wandb"] = "tensorboard"
+    """Who draws the curves beside the run's own metrics.jsonl: tensorboard (its files are always written), or wandb,
+    which reads along."""
+
+    def check(self) -> None:
+        """Refuse numbers out of range, and what does not go together.
+
+        Raises:
+            InputError: there is such.
+        """
+        if self.save_every <= 0:
+            raise InputError(f"--save-every must be positive, got {self.save_every}")
+        if self.iterations is not None and self.iterations < 1:
+            raise InputError(f"--iterations must be at least 1, got {self.iterations}")
+        if self.minutes is not None and self.minutes <= 0:
+            raise InputError(f"--minutes must be positive, got {self.minutes}")
+        if self.resume and self.from_policy:
+            raise InputError("--from starts a new run and --resume goes on with an old one; give one of them")
+        if self.resume and (self.overrides or self.config or self.out or self.num_envs or self.seed):
+            raise InputError(
+                "--resume goes on with the run's own config; only --iterations, --minutes and --device may be given"
+            )
+
+    def read_config(self, kind: type[AnyConfig], source: str) -> AnyConfig:
+        """The config of a new run."""
+        from vinl.config.loader import load_config
+
+        short = {"num_envs": self.num_envs, "iterations": self.iterations, "seed": self.seed}
+        return load_config(kind, source, [*self.overrides, *(f"{k}={v}" for k, v in short.items() if v is not None)])
+
+    def start_logger(self, folder: str) -> None:
+        """Begin what the logger needs. TensorBoard's files in the run's folder are always written; Weights & Biases
+        reads along.
+
+        Raises:
+            InputError: the logger is not installed.
+        """
+        if self.logger == "tensorboard":
+            return
+        try:
+            import wandb  # pyright: ignore[reportMissingImports]  (an extra of its own)
+        except ModuleNotFoundError:
+            raise InputError("--logger wandb: it is not installed; pip install wandb") from None
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        wandb.init(project="vinl", name=Path(folder).name, dir=folder, sync_tensorboard=True)
