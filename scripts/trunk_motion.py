@@ -16,6 +16,7 @@ from vinl.chain.robot import Robot, Robots
 from vinl.chain.scene import build_scene
 from vinl.chain.workers import Context, WorkerPool
 from vinl.config.errors import InputError
+from vinl.courses.courses import FIXED, draw_commands
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
 from vinl.robot.rotation import matrix_of, yaw_of
@@ -32,13 +33,6 @@ GROUP = 16
 
 _HALF = 20.0
 """Half the side of the walled square that they walk in [m]."""
-
-_MODES = ((0.55, (0.6, 1.0), (0.0, 0.25)), (0.25, (0.3, 0.8), (0.2, 1.05)), (0.15, (0.0, 0.15), (0.5, 1.05)))
-"""What a navigator asks for: share, forward speed [m/s] and size of the yaw rate [rad/s] of walking on, of walking a
-curve and of turning on the spot; the rest of the time it stands."""
-
-_STAY, _JITTER = 0.8, (0.08, 0.15)
-"""Share of the decisions that keep to the mode before, and what is added to each decision [m/s, rad/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,19 +78,9 @@ def record_motion(
         return [record for group in pool.run(_record_group, jobs, lambda: None) for record in group]
 
 
-def draw_commands(rng: np.random.Generator, count: int) -> Float[np.ndarray, "count 2"]:
+def draw_decisions(rng: np.random.Generator, count: int) -> Float[np.ndarray, "count 2"]:
     """Forward speeds [m/s] and yaw rates [rad/s] as a navigator gives them, one each 0.5 s."""
-    commands, aim = np.zeros((count, 2)), np.zeros(2)
-    for k in range(count):
-        if k == 0 or rng.random() > _STAY:
-            aim = np.zeros(2)
-            at = rng.random()
-            for share, speed, rate in _MODES:
-                if 0 <= at < share:
-                    aim = np.array([rng.uniform(*speed), rng.uniform(*rate) * rng.choice([-1.0, 1.0])])
-                at -= share
-        commands[k] = aim + rng.normal(size=2) * _JITTER if aim.any() else aim
-    return np.clip(commands, [0.0, -np.pi / 3], [1.0, np.pi / 3])
+    return draw_commands(FIXED["navigator"], rng, count * PERIOD)[0][::PERIOD, [0, 2]]
 
 
 def _build_square() -> FloorPlan:
@@ -113,7 +97,7 @@ def _record_group(context: Context, robots: range) -> list[MotionRecord]:
     policy, clutter, steps, seed = context.shared
     n, plan = len(robots), _build_square()
     rngs = [np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, k]))) for k in robots]
-    orders = np.stack([draw_commands(rng, steps // PERIOD + 1) for rng in rngs])
+    orders = np.stack([draw_decisions(rng, steps // PERIOD + 1) for rng in rngs])
     starts = np.stack([np.append(rng.uniform(-6, 6, 2), rng.uniform(-np.pi, np.pi)) for rng in rngs])
     scatter = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, robots.start, 1])))
     blocks = scatter_blocks(plan, CLUTTER[clutter], scatter, starts[:, :2])

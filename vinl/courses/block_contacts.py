@@ -48,6 +48,14 @@ class BlockContacts(NamedTuple):
         """No touch."""
         return cls(*(np.zeros(shape, bool) for shape in ((n, 4), (n, 4), (n, BINS), (n, BINS), n, n)))
 
+    def count_pairs(self, row: int, feet: list[int], legs: list[int]) -> tuple[int, int, int]:
+        """Add a robot's touches to counts of its front and rear feet and legs; 1 where any foot, any leg, the trunk
+        touched a block."""
+        for flags, counts in ((self.feet[row], feet), (self.legs[row], legs)):
+            counts[0] += int(flags[:2].any())
+            counts[1] += int(flags[2:].any())
+        return int(self.feet[row].any()), int(self.legs[row].any()), int(self.trunk[row])
+
 
 class BlockContactReader(ContactReader):
     """Also notes which feet and legs touch blocks, and blocks of what height.

@@ -13,7 +13,6 @@ from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.gait_metrics import GaitRecord, record_gait
 from vinl.courses.grounds import Ground
 from vinl.courses.herd import BoxHerd
-from vinl.courses.robot_records import FRONT, REAR
 from vinl.courses.trial import controller_on_course
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT
@@ -151,10 +150,8 @@ def _count(record: CrossingRecord, row: int, touches: BlockContacts, metres: flo
     """One control step of one robot."""
     record.time_s = round(record.time_s + CONTROL_DT, 6)
     record.metres += metres
-    record.foot_steps += int(touches.feet[row].any())
-    record.leg_steps += int(touches.legs[row].any())
-    record.trunk_steps += int(touches.trunk[row])
+    foot, leg, trunk = touches.count_pairs(row, record.foot_pair_steps, record.leg_pair_steps)
+    record.foot_steps += foot
+    record.leg_steps += leg
+    record.trunk_steps += trunk
     record.wall_steps += int(touches.walls[row])
-    for j, pair in enumerate((FRONT, REAR)):
-        record.foot_pair_steps[j] += int(touches.feet[row, pair].any())
-        record.leg_pair_steps[j] += int(touches.legs[row, pair].any())

@@ -16,8 +16,6 @@ from vinl.courses.block_contacts import BINS, HEIGHT_EDGES
 from vinl.courses.gait_metrics import GaitRecord, aggregate_gait
 from vinl.robot.aliengo import CONTROL_DT
 
-FRONT, REAR = slice(0, 2), slice(2, 4)
-
 HEIGHT_NAMES = tuple(f"{a:.2f}-{b:.2f}" for a, b in pairwise(HEIGHT_EDGES))
 """Names of the bins of block height [m]."""
 

@@ -17,7 +17,7 @@ from vinl.courses.courses import Course
 from vinl.courses.gait_metrics import record_gait
 from vinl.courses.grounds import Ground
 from vinl.courses.herd import Herd
-from vinl.courses.robot_records import FRONT, REAR, RobotRecord
+from vinl.courses.robot_records import RobotRecord
 from vinl.courses.step_counter import StepCounter
 from vinl.policies.card import find_detour, find_gait, reads_ground
 from vinl.policies.policy import Policy
@@ -119,12 +119,10 @@ def _add_touches(
         record.falls += int(fallen[k])
     for k in np.flatnonzero(touches.feet.any(1) | touches.legs.any(1) | touches.trunk).tolist():
         record = records[k]
-        record.trunk_block_steps += int(touches.trunk[k])
-        record.foot_block_steps += int(touches.feet[k].any())
-        record.leg_block_steps += int(touches.legs[k].any())
-        for j, pair in enumerate((FRONT, REAR)):
-            record.foot_pair_steps[j] += int(touches.feet[k, pair].any())
-            record.leg_pair_steps[j] += int(touches.legs[k, pair].any())
+        foot, leg, trunk = touches.count_pairs(k, record.foot_pair_steps, record.leg_pair_steps)
+        record.foot_block_steps += foot
+        record.leg_block_steps += leg
+        record.trunk_block_steps += trunk
         for j in np.flatnonzero(touches.foot_bins[k]).tolist():
             record.foot_height_steps[j] += 1
         for j in np.flatnonzero(touches.leg_bins[k]).tolist():
