@@ -75,7 +75,9 @@ def scene_spec(
     return spec
 
 
-def _add_contact_sensor(spec: mujoco.MjSpec, name: str, first, a: str, second, b: str, data: int, reduce: int) -> None:
+def _add_contact_sensor(
+    spec: mujoco.MjSpec, name: str, first: mujoco.mjtObj, a: str, second: mujoco.mjtObj, b: str, data: int, reduce: int
+) -> None:
     spec.add_sensor(
         name=name,
         type=mujoco.mjtSensor.mjSENS_CONTACT,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from vinl.loco.config import LocoConfig
 from vinl.loco.environment import MAX_SPEED
 from vinl.loco.nan_guard import Lost
 from vinl.loco.randomisation import Traits, plain_traits
-from vinl.loco.simulation import Body, Simulation, target_age, torque_range
+from vinl.loco.simulation import Body, DeviceGround, Simulation, target_age, torque_range
 from vinl.robot.aliengo import FOOT_GEOMS, JOINTS, SUBSTEPS
 from vinl.world.heightfield import HeightField
 from vinl.world.terrain import build_terrain
@@ -148,11 +148,11 @@ def _mjx_steps(simulation: Simulation, v: dict[str, Any]) -> Iterator[Row]:
     body = Body(*(jnp.asarray(v[name], jnp.float32) for name in ("qpos", "qvel", "warmstart")))
     traits = _traits(v)
 
-    def once(ground: Any, body: Body, target: Any) -> Any:
+    def once(ground: DeviceGround, body: Body, target: jax.Array) -> tuple[Body, jax.Array, jax.Array]:
         data = simulation.physics_step(simulation.robot_model(ground, traits), body, target)
         return Body(data.qpos, data.qvel, data.qacc_warmstart), data.qacc, data.actuator_force
 
-    step: Callable[..., Any] = jax.jit(once)
+    step = jax.jit(once)
     for target in _targets(v):
         body, acceleration, torque = step(simulation.ground, body, jnp.asarray(target, jnp.float32))
         yield tuple(np.asarray(x, np.float64) for x in (body.qpos, body.qvel, acceleration, torque))  # type: ignore[misc]
@@ -170,7 +170,7 @@ def _mujoco_steps(simulation: Simulation, v: dict[str, Any]) -> Iterator[Row]:
     model.actuator_biasprm[:, 2] *= float(v["kd"])
     model.dof_frictionloss[:] *= float(v["joint_friction"])
     model.dof_damping[:] *= float(v["joint_friction"])
-    data: Any = mujoco.MjData(model)
+    data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = v["qpos"], v["qvel"], v["warmstart"]
     for target in _targets(v):
         data.ctrl[:] = target

@@ -170,7 +170,7 @@ class LiveChain:
                 name: DepthImage(camera.camera, camera.look(qpos)[0].numpy().copy())
                 for name, camera in self._cameras.items()
             }
-        data: Any = self._walker.data
+        data = self._walker.data
         return Snapshot(
             world=self.world,
             time_s=self._steps * CONTROL_DT,
