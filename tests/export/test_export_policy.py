@@ -9,8 +9,8 @@ import torch
 
 from vinl.cli.app import main
 from vinl.config.errors import InputError
-from vinl.export import extra, policy
-from vinl.export.frames import explain_rows
+from vinl.export import policy
+from vinl.export.metadata import explain_rows
 from vinl.export.onnx_file import build_model, read_metadata
 from vinl.export.parity import LIMIT, ExportedPolicy
 from vinl.export.policy import Exported, ParityError, export_policy
@@ -189,6 +189,6 @@ def test_bad_input_is_one_line(argv: str, says: str, capsys: pytest.CaptureFixtu
 
 
 def test_without_the_extra(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-    monkeypatch.setattr(extra, "find_spec", lambda name: None if name == "onnxruntime" else object())
+    monkeypatch.setattr(policy, "find_spec", lambda name: None if name == "onnxruntime" else object())
     assert main(["export", "loco"]) == 2
     assert capsys.readouterr().err == 'error: export needs onnxruntime; install it: pip install "vinl[export]"\n'

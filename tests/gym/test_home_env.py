@@ -20,8 +20,7 @@ from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.chain.records import plain_record
 from vinl.config.errors import InputError
 from vinl.config.loader import load_config
-from vinl.gym.actions import JOINT_REACH
-from vinl.gym.home import RANGE, HomeEnv
+from vinl.gym.home import JOINT_REACH, RANGE, HomeEnv
 from vinl.nav.config import NavConfig
 from vinl.policies.card import navigation_table
 from vinl.policies.policy import LocomotionPolicy

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from vinl.loco.scenery import patch_mesh, terrain_mesh
-from vinl.loco.sight import Sight
+from vinl.loco.sight import Sight, patch_mesh, terrain_mesh
 from vinl.loco.student_config import CameraConfig, SightConfig
 from vinl.robot.cameras import LOCOMOTION_CAMERA
 from vinl.world.grid import GridFrame

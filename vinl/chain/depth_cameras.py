@@ -18,8 +18,6 @@ from vinl.world.mesh import floor_mesh, join_meshes, seen_box_mesh
 _ON_FLOOR, _OVER_CAMERA = 0.01, 1.2
 """A box lower than this stands on the floor; the cameras of a robot of 0.5 m stay below this [m]."""
 
-_FLOOR_TRIANGLES = 2
-
 
 class DepthCameras:
     """A depth camera on each of n robots, on the CPU. The robots do not see each other, nor themselves.

@@ -120,11 +120,11 @@ def check_policy() -> str:
 
 def check_video() -> str:
     """An MP4 can be written."""
-    import imageio.v2 as imageio
+    from vinl.render.film_file import write_film
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trial.mp4"
-        imageio.mimwrite(path, [np.full((64, 64, 3), level, np.uint8) for level in (0, 255)], fps=10)
+        write_film((np.full((64, 64, 3), level, np.uint8) for level in (0, 255)), path, 10.0)
         return f"MP4 written ({path.stat().st_size} bytes)"
 
 

@@ -6,11 +6,11 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from vinl.chain.workers import one_thread
 from vinl.config.errors import InputError
-from vinl.export.extra import check_extra
 from vinl.export.onnx_file import build_model
 from vinl.export.parity import LIMIT, ExportedPolicy, Parity, compare_steps
 from vinl.export.recording import record_steps
@@ -107,3 +107,18 @@ def _draft(path: Path) -> Iterator[Path]:
             draft.replace(path)
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror}; choose another --out or make room") from None
+
+
+PACKAGES = ("onnx", "onnxscript", "onnxruntime")
+"""What ``vinl[export]`` installs: the format, torch's exporter to it, and the runtime that checks the file."""
+
+
+def check_extra() -> None:
+    """Refuse to begin where the extra is not installed.
+
+    Raises:
+        InputError: a package is missing; says how to install it.
+    """
+    missing = [name for name in PACKAGES if find_spec(name) is None]
+    if missing:
+        raise InputError(f'export needs {", ".join(missing)}; install it: pip install "vinl[export]"')

@@ -9,7 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 
 from vinl.chain.choose import choose_locomotor
 from vinl.chain.config import EvaluationConfig
@@ -20,7 +20,6 @@ from vinl.chain.workers import one_thread
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
 from vinl.config.loader import load_config
-from vinl.gym.actions import JOINT_REACH, check_action, joint_target_of
 from vinl.gym.chase import ChaseView
 from vinl.gym.drivers import Guide, Legs
 from vinl.gym.observations import AgentObservation, Cameras, choose_cameras
@@ -29,12 +28,36 @@ from vinl.nav.config import NavConfig
 from vinl.policies.card import navigation_table
 from vinl.policies.policy import Policy
 from vinl.policies.velocity_range import VelocityRange
-from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT
+from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
 from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan
 from vinl.world.free_space import FreeSpace
 from vinl.world.readers import open_floorplans
 from vinl.world.start_goal import sample_start_goals
+
+JOINT_REACH = 4.0
+"""Joint target = default pose + this x action [rad]. Holds what the shipped locomotors ask for: up to 3.4 rad, far
+beyond where the joints get, for a target is the way to ask for a torque."""
+
+
+def joint_target_of(action: Float[np.ndarray, "12"], reach: float) -> Float[np.ndarray, "12"]:
+    """Joint targets [rad]: the default pose, and ``reach`` [rad] for an action of 1."""
+    return DEFAULT_POSE + reach * action.astype(np.float64)
+
+
+def check_action(action: np.ndarray, size: int) -> Float[np.ndarray, " n"]:
+    """An action of so many numbers, held to [-1, 1].
+
+    Raises:
+        InputError: another shape, or numbers that are not finite.
+    """
+    found = np.asarray(action, dtype=np.float32)
+    if found.shape != (size,):
+        raise InputError(f"an action of this environment has shape ({size},), got {found.shape}")
+    if not np.isfinite(found).all():
+        raise InputError("an action must be finite, got NaN or infinite")
+    return found.clip(-1.0, 1.0)
+
 
 Plans = str | Path | FloorPlan | Sequence[str | Path | FloorPlan]
 CONTROLS = ("velocity", "joints")

@@ -14,10 +14,9 @@ from vinl.gait.observation import SENSED_TABLE
 from vinl.loco.config import LocoConfig
 from vinl.loco.distillation import Distillation
 from vinl.loco.environment import LocoEnvironment
-from vinl.loco.scenery import terrain_mesh
-from vinl.loco.sight import Sight
-from vinl.loco.sighted_env import SightedVecEnv
+from vinl.loco.sight import Sight, terrain_mesh
 from vinl.loco.student_config import StudentConfig
+from vinl.loco.vec_env import SightedVecEnv
 from vinl.loco.warm_start import load_teacher
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.commit import find_commit

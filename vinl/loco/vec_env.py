@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
@@ -15,6 +15,10 @@ from tensordict import TensorDict
 from vinl.gait.state import GaitState
 from vinl.loco.environment import LocoEnvironment, Observations, StepResult
 from vinl.loco.state import EnvState
+from vinl.rl.stopwatch import Stopwatch
+
+if TYPE_CHECKING:
+    from vinl.loco.sight import Sight  # Warp is started for stage 3 alone
 
 _LENT = 8
 """How many steps lent arrays are kept alive: the two libraries run on streams of their own, and neither may reuse
@@ -129,3 +133,44 @@ def _by_name(state: EnvState) -> dict[str, jax.Array]:
 def _saved(x: np.ndarray) -> torch.Tensor:
     # torch lacks most operations on unsigned 32-bit numbers
     return torch.from_numpy(x.astype(np.int64) if x.dtype == np.uint32 else x.copy())
+
+
+class SightedVecEnv(LocoVecEnv):
+    """More observation groups: ``depth`` (n, H, W) float16 in [0, 1], and what a student learns to predict, ``plan``,
+    ``heights`` and ``velocity``, see ``environment.Observations``.
+
+    Args:
+        environment: the robots.
+        sight: their cameras.
+        device: torch device; JAX must run on the same kind.
+        stopwatch: times ``simulate`` and ``render``.
+    """
+
+    def __init__(self, environment: LocoEnvironment, sight: Sight, device: str, stopwatch: Stopwatch) -> None:
+        super().__init__(environment, device)
+        self.sight, self._stopwatch = sight, stopwatch
+
+    def save_state(self) -> dict[str, Any]:
+        """The whole state of all robots and cameras."""
+        return {**super().save_state(), "sight": self.sight.save_state()}
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Go on from a saved state.
+
+        Raises:
+            ValueError: the state is of another number of robots.
+        """
+        super().load_state(state)
+        self.sight.load_state(state["sight"])
+
+    def _simulate(self, actions: torch.Tensor) -> StepResult:
+        with self._stopwatch.part("simulate"):
+            return super()._simulate(actions)
+
+    def _pack(self, seen: dict[str, torch.Tensor], done: torch.Tensor | None) -> TensorDict:
+        observation = super()._pack(seen, done)
+        for name in ("plan", "heights", "velocity"):
+            observation[name] = seen[name]
+        with self._stopwatch.part("render"):
+            observation["depth"] = self.sight.look(seen["pose"], done)
+        return observation

@@ -151,12 +151,6 @@ class SceneView:
         """A point of viser's scene [m] in the world of the floor plan [m]."""
         return point - np.asarray(self._root.position)
 
-    def drop_cameras(self) -> None:
-        """Forget the cameras: other policies carry others."""
-        for handle in self._frustums.values():
-            handle.remove()
-        self._frustums.clear()
-
     @property
     def extent(self) -> float:
         """The longer side of the building [m]."""

@@ -10,8 +10,7 @@ from vinl.config.fields import closest
 from vinl.config.paths import assets_dir
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers.image import read_image_plan
-from vinl.world.readers.json_plan import read_json_plan
-from vinl.world.readers.ranges import expand_paths
+from vinl.world.readers.json_plan import expand_paths, read_json_plan
 from vinl.world.readers.ros_map import read_ros_map
 
 IMAGES = (".png", ".pgm")
