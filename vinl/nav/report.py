@@ -11,12 +11,13 @@ import numpy as np
 from rich.console import Console
 
 from vinl.chain.metrics import summarise
-from vinl.render.drawing import draw_histogram, keep_low, outline_boxes, outline_path
+from vinl.render.drawing import draw_histogram, outline_boxes, outline_path
 from vinl.render.page import open_table, render_page
 from vinl.robot.aliengo import LENGTH
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.endings import SUCCESS
+from vinl.world.floorplan import BODY_HEIGHT
 
 DISTANCES = (0.0, 5.0, 7.5, 10.0, 15.0, 20.0, 30.0, float("inf"))
 """Edges of the classes of geodesic distance [m]."""
@@ -81,7 +82,7 @@ def draw_episode(record: Any, trace: Any) -> str:
     path = trace.path if len(trace.path) > 1 else np.repeat(trace.path, 2, 0)
     return (
         f'<svg class="map {record.end_reason}" viewBox="{low[0]:.2f} {-high[1]:.2f} {width:.2f} {height:.2f}" '
-        f'role="img"><path class="wall" d="{outline_boxes(keep_low(solid))}"/>'
+        f'role="img"><path class="wall" d="{outline_boxes(solid.below(BODY_HEIGHT))}"/>'
         f'<path class="block" d="{outline_boxes(Blocks(np.asarray(trace.blocks, np.float64)).boxes())}"/>'
         f'<path class="way" d="{outline_path(np.asarray(path))}"/>{lost}'
         f'<circle class="start" cx="{sx:.2f}" cy="{-sy:.2f}" r="{LENGTH / 5:.2f}"/>'
