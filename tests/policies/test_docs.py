@@ -1,4 +1,4 @@
-"""docs/policies.md says what the code does."""
+"""docs/policies.md and the observation table of docs/robot.md say what the code does."""
 
 import re
 from pathlib import Path
@@ -8,17 +8,23 @@ import numpy as np
 import vinl
 from vinl.robot.observation import TABLE
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "policies.md").read_text()
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "policies.md"
 
 
 def test_observation_table_is_that_of_the_code():
-    rows = re.findall(r"^\| (\d+) \| .* \| (.*) \| ([\d., ]+) \|$", PAGE, re.MULTILINE)
-    said = [(int(size), unit, tuple(float(x) for x in scale.split(","))) for size, unit, scale in rows]
-    assert said == [(term.size, term.unit, term.scale) for term in TABLE]
+    page = PAGE.with_name("robot.md").read_text()
+    rows = re.findall(r"^\| (\w+) \| (\d+) \| (.*) \| ([\d., ]+) \| ([\d.]+) \|$", page, re.MULTILINE)
+    said = [
+        (name, int(size), tuple(float(x) for x in scale.split(",")), float(noise))
+        for name, size, _, scale, noise in rows
+    ]
+    assert said == [(term.name, term.size, term.scale, term.noise) for term in TABLE]
+    for (_, _, unit, _, _), term in zip(rows, TABLE, strict=True):
+        assert set(term.unit.split(", ")) <= set(re.split(r"[,:]? ", unit))
 
 
 def test_code_on_the_page_runs(tmp_path: Path):
-    use, save, see = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    use, save, see = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
     names = {"vinl": vinl}
     exec(save, names)
     assert (tmp_path / "my_policy" / "card.json").exists()
