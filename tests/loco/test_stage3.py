@@ -126,7 +126,7 @@ def test_policies_that_cannot_teach_are_refused(tmp_path, capsys):
     ["bptt=5", "code_weight=-1", "learning_rate=0", "teacher_share=2", "minibatches=0", "max_grad_norm=0"],
 )
 def test_bad_settings_are_refused(wrong):
-    with pytest.raises(InputError, match="weights" if "weight" in wrong else wrong.split("=")[0]):
+    with pytest.raises(InputError, match=wrong.split("=")[0]):
         load_config(LocoConfig, "loco/student", [f"student.distillation.{wrong}"])
 
 

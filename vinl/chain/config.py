@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from vinl.chain.fault_config import FaultConfig
 from vinl.config.errors import InputError
+from vinl.config.limits import check_fields, check_number
 from vinl.sensing.odometry_config import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig
 from vinl.world.endings import MAX_TILT
@@ -33,11 +34,8 @@ class OracleConfig:
     replan_m: float = 0.6
 
     def __post_init__(self) -> None:
-        if not 0 < self.speed <= 1:
-            raise InputError(f"oracle.speed must lie in (0, 1] m/s, got {self.speed}")
-        for name in ("look_ahead", "turn_gain", "turn_rate", "turn_in_place", "replan_m"):
-            if not getattr(self, name) > 0:
-                raise InputError(f"oracle.{name} must be positive, got {getattr(self, name)}")
+        positive = ("speed", "look_ahead", "turn_gain", "turn_rate", "turn_in_place", "replan_m")
+        check_fields(self, "oracle.", positive=positive, fractions=("speed",))
 
 
 @dataclass(frozen=True)
@@ -79,17 +77,13 @@ class EvaluationConfig:
     faults: FaultConfig = field(default_factory=FaultConfig)
 
     def __post_init__(self) -> None:
-        if not 0.02 <= self.time_limit <= 3600:
-            raise InputError(f"time_limit must lie between 0.02 and 3600 s, got {self.time_limit}")
-        if self.navigation_period < 1:
-            raise InputError(f"navigation_period must be at least 1 control step, got {self.navigation_period}")
-        if not 0 < self.max_tilt <= math.pi:
-            raise InputError(f"max_tilt must lie in (0, pi] rad, got {self.max_tilt}")
+        check_number("time_limit", self.time_limit, 0.02, 3600.0)
+        check_number("max_tilt", self.max_tilt, 0.0, math.pi)
+        check_fields(
+            self,
+            counts=("navigation_period",),
+            positive=("success_radius", "stuck_window", "min_metres", "max_tilt"),
+            unsigned=("min_distance", "clearance", "joint_noise", "stuck_distance"),
+        )
         if self.ceiling is not None and not 1 <= self.ceiling <= 100:
             raise InputError(f"ceiling must lie between 1 and 100 m, got {self.ceiling}; null for none")
-        for name in ("success_radius", "stuck_window", "min_metres"):
-            if not getattr(self, name) > 0:
-                raise InputError(f"{name} must be positive, got {getattr(self, name)}")
-        for name in ("min_distance", "clearance", "joint_noise", "stuck_distance"):
-            if not getattr(self, name) >= 0:
-                raise InputError(f"{name} must not be negative, got {getattr(self, name)}")

@@ -9,9 +9,6 @@ from typing import TYPE_CHECKING
 
 from vinl.config.errors import InputError
 from vinl.config.fields import closest
-from vinl.policies.card import read_card
-from vinl.policies.io import find_policy
-from vinl.rl.run_folder import METRICS, RunFolder
 
 if TYPE_CHECKING:
     from vinl.chain.config import EvaluationConfig
@@ -68,6 +65,9 @@ def check_source(name: str, kind: str) -> None:
     Raises:
         InputError: it is one, or there is none.
     """
+    from vinl.policies.card import read_card
+    from vinl.policies.io import find_policy
+
     card = read_card(find_policy(name))
     if card.kind != kind:
         raise InputError(f"--from {name} is a {card.kind} policy: use {COMMANDS[card.kind]}")
@@ -79,6 +79,8 @@ def check_run(folder: str, kind: str, iterations: int | None) -> None:
     Raises:
         InputError: it is one, or no run.
     """
+    from vinl.rl.run_folder import RunFolder
+
     run = RunFolder(folder)
     found = "navigation" if "homes" in run.open() else "locomotion"
     if found != kind:
@@ -90,6 +92,8 @@ def check_run(folder: str, kind: str, iterations: int | None) -> None:
 
 def count_iterations(folder: Path) -> int:
     """Of a run, by its curves; 0 without any."""
+    from vinl.rl.run_folder import METRICS
+
     file = folder / METRICS
     lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
     for line in reversed(lines):

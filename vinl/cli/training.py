@@ -10,6 +10,7 @@ import tyro
 
 from vinl.cli.options import Settings
 from vinl.config.errors import InputError
+from vinl.config.limits import check_fields
 
 if TYPE_CHECKING:
     from vinl.loco.config import LocoConfig
@@ -60,10 +61,7 @@ class TrainingOptions:
         """
         if self.save_every <= 0:
             raise InputError(f"--save-every must be positive, got {self.save_every}")
-        if self.iterations is not None and self.iterations < 1:
-            raise InputError(f"--iterations must be at least 1, got {self.iterations}")
-        if self.minutes is not None and self.minutes <= 0:
-            raise InputError(f"--minutes must be positive, got {self.minutes}")
+        check_fields(self, "--", counts=("iterations",), positive=("minutes",))
         if self.resume and self.from_policy:
             raise InputError("--from starts a new run and --resume goes on with an old one; give one of them")
         if self.resume and (self.overrides or self.config or self.out or self.num_envs or self.seed):

@@ -6,19 +6,15 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
 from vinl.config.errors import InputError
+from vinl.config.limits import Range, check_fields, check_number, check_range
 from vinl.gait.config import GaitConfig
 from vinl.loco.student_config import StudentConfig
 from vinl.robot.aliengo import KD, KP
-from vinl.robot.commands import CommandConfig, Range
+from vinl.robot.commands import CommandConfig
 from vinl.world.terrain import TerrainConfig
 
 MAX_LATENCY = 0.04
 """Longest time from an observation to its action's effect that is simulated [s]: two control steps."""
-
-
-def _check_range(name: str, value: Range) -> None:
-    if not value[0] <= value[1]:
-        raise InputError(f"{name} must be a rising range, got {value[0]} to {value[1]}")
 
 
 @dataclass(frozen=True)
@@ -76,8 +72,7 @@ class RewardConfig:
     floor: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.sigma <= 0:
-            raise InputError(f"rewards.sigma must be positive, got {self.sigma}")
+        check_fields(self, "rewards.", positive=("sigma",))
         if self.floor > 0:
             raise InputError(f"rewards.floor must not be positive, got {self.floor}")
 
@@ -131,23 +126,16 @@ class RandomisationConfig:
     noise_from: Range = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name in ("friction", "added_mass", "kp_scale", "kd_scale", "joint_friction", "latency", "noise_from"):
-            _check_range(f"randomisation.{name}", getattr(self, name))
-        for name in ("friction", "kp_scale", "kd_scale"):
-            if getattr(self, name)[0] <= 0:
-                raise InputError(f"randomisation.{name} must be positive")
-        if self.joint_friction[0] < 0:
-            raise InputError("randomisation.joint_friction must not be negative")
-        if not 0 <= self.latency[0] <= self.latency[1] <= MAX_LATENCY:
-            raise InputError(f"randomisation.latency must lie between 0 and {MAX_LATENCY} s, got {list(self.latency)}")
-        if not 0 <= self.noise_from[0] <= self.noise_from[1] <= 1:
-            raise InputError(f"randomisation.noise_from are fractions of the training, got {list(self.noise_from)}")
-        if self.push_interval <= 0 or self.velocity_bias_time <= 0:
-            raise InputError("randomisation.push_interval and velocity_bias_time must be positive")
-        noises = ("observation_noise", "map_noise", "velocity_bias", "angular_velocity_bias", "gravity_bias")
-        for name in noises:
-            if getattr(self, name) < 0:
-                raise InputError(f"randomisation.{name} must not be negative")
+        scales, noises = ("friction", "kp_scale", "kd_scale"), ("observation_noise", "map_noise", "gravity_bias")
+        check_fields(
+            self,
+            "randomisation.",
+            rising=(*scales, "added_mass", "joint_friction", "noise_from"),
+            positive=(*scales, "push_interval", "velocity_bias_time"),
+            unsigned=("joint_friction", "velocity_bias", "angular_velocity_bias", *noises),
+            fractions=("noise_from",),
+        )
+        check_range("randomisation.latency", self.latency, 0.0, MAX_LATENCY)
 
     def noise_at(self, fraction: float) -> float:
         """How much of noise, biases and latency there is after a fraction of the training, from 0 to 1."""
@@ -179,12 +167,9 @@ class CurriculumConfig:
     max_contacts: float | None = None
 
     def __post_init__(self) -> None:
-        if self.first_level < 0:
-            raise InputError("curriculum.first_level must not be negative")
+        check_fields(self, "curriculum.", unsigned=("first_level", "max_contacts"))
         if not 0 <= self.demote <= self.promote:
             raise InputError("curriculum: need 0 <= demote <= promote")
-        if self.max_contacts is not None and self.max_contacts < 0:
-            raise InputError(f"curriculum.max_contacts must not be negative, got {self.max_contacts}")
 
 
 @dataclass(frozen=True)
@@ -232,14 +217,9 @@ class LocoPpoConfig:
     update: Literal["rsl_rl", "fast", "graphs"] = "graphs"
 
     def __post_init__(self) -> None:
-        if min(self.steps, self.epochs, self.minibatches) < 1:
-            raise InputError("ppo: steps, epochs and minibatches must be at least 1")
-        if self.critic_warmup < 0:
-            raise InputError(f"ppo.critic_warmup must not be negative, got {self.critic_warmup}")
-        if self.learning_rate <= 0 or self.desired_kl <= 0 or self.init_std <= 0:
-            raise InputError("ppo: learning_rate, desired_kl and init_std must be positive")
-        if not 0 < self.gamma <= 1 or not 0 <= self.lam <= 1:
-            raise InputError("ppo: gamma must lie in (0, 1] and lam in [0, 1]")
+        rates = ("learning_rate", "desired_kl", "init_std", "gamma")
+        counts, fractions = ("steps", "epochs", "minibatches"), ("gamma", "lam")
+        check_fields(self, "ppo.", counts=counts, unsigned=("critic_warmup",), positive=rates, fractions=fractions)
 
 
 @dataclass(frozen=True)
@@ -260,8 +240,7 @@ class AnnealConfig:
     def __post_init__(self) -> None:
         if not 0 <= self.begin < self.end <= 1:
             raise InputError(f"anneal: need 0 <= begin < end <= 1, got {self.begin} and {self.end}")
-        if self.entropy is not None and self.entropy < 0:
-            raise InputError(f"anneal.entropy must not be negative, got {self.entropy}")
+        check_fields(self, "anneal.", unsigned=("entropy",))
         try:
             RewardConfig(**self.rewards)
         except TypeError:
@@ -319,11 +298,5 @@ class LocoConfig:
             raise InputError(f"stage {self.stage} does not exist; choose 1, 2 or 3")
         if (self.stage == 3) != (self.student is not None):
             raise InputError(f"stage {self.stage}: the group student belongs to stage 3, and to no other")
-        if not 1 <= self.num_envs <= 65536:
-            raise InputError(f"num_envs must lie between 1 and 65536, got {self.num_envs}")
-        if self.iterations < 1:
-            raise InputError(f"iterations must be at least 1, got {self.iterations}")
-        if self.episode_length <= 0:
-            raise InputError(f"episode_length must be positive, got {self.episode_length}")
-        if self.kp <= 0 or self.kd < 0:
-            raise InputError("kp must be positive and kd not negative")
+        check_number("num_envs", self.num_envs, 1, 65536)
+        check_fields(self, counts=("iterations",), positive=("episode_length", "kp"), unsigned=("kd",))

@@ -8,8 +8,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from vinl.config.limits import Range
 from vinl.loco.config import RandomisationConfig
-from vinl.robot.commands import UNIFORM, CommandConfig, Range, make_commands
+from vinl.robot.commands import UNIFORM, CommandConfig, make_commands
 
 Keys = TypeVar("Keys", bound=tuple)
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from vinl.config.errors import InputError
+from vinl.config.limits import check_fields, check_range
 from vinl.policies.depth_memory import MEMORIES, VISIONS
 from vinl.policies.stepping_actor import CODES
 from vinl.robot.cameras import LOCOMOTION_CAMERA, Camera
@@ -14,11 +15,6 @@ HOLES = ("far", "zero")
 
 MAX_DELAY = 0.04
 """An image comes at most this late [s]: two control steps."""
-
-
-def _check_fraction(name: str, value: float) -> None:
-    if not 0 <= value <= 1:
-        raise InputError(f"{name} must lie between 0 and 1, got {value}")
 
 
 @dataclass(frozen=True)
@@ -51,8 +47,9 @@ class NetworkConfig:
             raise InputError(f"student.network.vision must be one of {', '.join(VISIONS)}, got {self.vision!r}")
         if self.memory not in MEMORIES:
             raise InputError(f"student.network.memory must be one of {', '.join(MEMORIES)}, got {self.memory!r}")
-        if min(self.visual, self.hidden, self.layers, self.planes) < 1 or self.planes % 16:
-            raise InputError("student.network: sizes must be at least 1, planes a multiple of 16")
+        check_fields(self, "student.network.", counts=("visual", "hidden", "layers", "planes"))
+        if self.planes % 16:
+            raise InputError(f"student.network.planes must be a multiple of 16, got {self.planes}")
         if self.code not in CODES:
             raise InputError(f"student.network.code must be one of {', '.join(CODES)}, got {self.code!r}")
         if self.remember < 0 or self.remember == 1:
@@ -119,14 +116,9 @@ class SightConfig:
     delay: tuple[float, float] = (0.0, 0.04)
 
     def __post_init__(self) -> None:
-        if min(self.position, self.angle, self.noise) < 0:
-            raise InputError("student.sight: position, angle and noise must not be negative")
-        for name in ("zoom", "scale", "holes"):
-            _check_fraction(f"student.sight.{name}", getattr(self, name))
-        if not 0 <= self.delay[0] <= self.delay[1] <= MAX_DELAY:
-            raise InputError(f"student.sight.delay must lie between 0 and {MAX_DELAY} s, got {list(self.delay)}")
-        if self.hole_size < 1:
-            raise InputError(f"student.sight.hole_size must be at least 1, got {self.hole_size}")
+        sizes, fractions = ("position", "angle", "noise"), ("zoom", "scale", "holes")
+        check_fields(self, "student.sight.", unsigned=sizes, fractions=fractions, counts=("hole_size",))
+        check_range("student.sight.delay", self.delay, 0.0, MAX_DELAY)
         if self.hole_reads not in HOLES:
             raise InputError(f"student.sight.hole_reads must be one of {', '.join(HOLES)}, got {self.hole_reads!r}")
 
@@ -163,16 +155,18 @@ class DistillationConfig:
     bfloat16: bool = True
 
     def __post_init__(self) -> None:
-        if min(self.steps, self.bptt, self.epochs, self.minibatches) < 1:
-            raise InputError("student.distillation: steps, bptt, epochs and minibatches must be at least 1")
+        check_fields(
+            self,
+            "student.distillation.",
+            counts=("steps", "bptt", "epochs", "minibatches"),
+            positive=("last_learning_rate", "max_grad_norm"),
+            unsigned=("velocity_weight", "code_weight"),
+            fractions=("teacher_share", "teacher_until", "warmup"),
+        )
         if self.steps % self.bptt:
             raise InputError(f"student.distillation.bptt must divide steps {self.steps}, got {self.bptt}")
-        if not 0 < self.last_learning_rate <= self.learning_rate or self.max_grad_norm <= 0:
-            raise InputError("student.distillation: need 0 < last_learning_rate <= learning_rate and max_grad_norm > 0")
-        if min(self.velocity_weight, self.code_weight) < 0:
-            raise InputError("student.distillation: the weights must not be negative")
-        for name in ("teacher_share", "teacher_until", "warmup"):
-            _check_fraction(f"student.distillation.{name}", getattr(self, name))
+        if self.last_learning_rate > self.learning_rate:
+            raise InputError("student.distillation: need last_learning_rate <= learning_rate")
 
     def rate_at(self, fraction: float) -> float:
         """The learning rate after a fraction of the iterations."""

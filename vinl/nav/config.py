@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from vinl.config.errors import InputError
-from vinl.config.limits import Range, check_number, check_range
+from vinl.config.limits import Range, check_fields, check_number, check_range
 from vinl.nav.ppo_config import NavNetworkConfig, NavPpoConfig
 from vinl.nav.robot_config import ExecutionConfig, MotionConfig, NavCameraConfig, RobotConfig, ViewConfig
 from vinl.policies.card import PREVIOUS
@@ -49,12 +49,8 @@ class HomesConfig:
     workers: int | None = None
 
     def __post_init__(self) -> None:
-        for name in ("count", "goals", "starts"):
-            if getattr(self, name) < 1:
-                raise InputError(f"homes.{name} must be at least 1, got {getattr(self, name)}")
-        if self.seed < 0:
-            raise InputError(f"homes.seed must not be negative, got {self.seed}")
-        check_number("homes.plans_share", self.plans_share, 0.0, 1.0)
+        counts, unsigned = ("count", "goals", "starts"), ("seed", "workers")
+        check_fields(self, "homes.", counts=counts, unsigned=unsigned, fractions=("plans_share",))
         for layout, fraction in self.layouts.items():
             layout_config(layout, self.generator)
             check_number(f"homes.layouts.{layout}", fraction, 0.0, 1.0)
@@ -65,8 +61,6 @@ class HomesConfig:
         check_number("homes.path_radius", self.path_radius, 0.1, 1.0)
         check_number("homes.start_clearance", self.start_clearance, 0.0, 2.0)
         check_number("homes.goal_clearance", self.goal_clearance, 0.0, 2.0)
-        if self.workers is not None and self.workers < 0:
-            raise InputError(f"homes.workers must not be negative, got {self.workers}")
 
 
 @dataclass(frozen=True)
@@ -92,8 +86,7 @@ class EpisodeConfig:
         check_number("episodes.success_geodesic", self.success_geodesic, self.success_radius, 50.0)
         check_range("episodes.distance", self.distance, self.success_radius, 1000.0)
         check_range("episodes.start_speed", self.start_speed, 0.0, 1.0)
-        if self.steps < 1:
-            raise InputError(f"episodes.steps must be at least 1, got {self.steps}")
+        check_fields(self, "episodes.", counts=("steps",))
 
 
 @dataclass(frozen=True)
@@ -144,8 +137,7 @@ class NavRewardConfig:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.scale <= 0:
-            raise InputError(f"reward.scale must be positive, got {self.scale}")
+        check_fields(self, "reward.", positive=("scale",))
 
 
 @dataclass(frozen=True)
@@ -183,14 +175,11 @@ class NavConfig:
     ppo: NavPpoConfig = field(default_factory=NavPpoConfig)
 
     def __post_init__(self) -> None:
-        if self.iterations < 1:
-            raise InputError(f"iterations must be at least 1, got {self.iterations}")
-        if not 1 <= self.num_envs <= 65536:
-            raise InputError(f"num_envs must lie between 1 and 65536, got {self.num_envs}")
+        check_fields(self, counts=("iterations",))
+        check_number("num_envs", self.num_envs, 1, 65536)
+        check_number("seed", self.seed, 0, 2**31 - 1)
         if self.previous not in PREVIOUS:
             raise InputError(f"previous must be one of {', '.join(PREVIOUS)}, got {self.previous!r}")
-        if not 0 <= self.seed < 2**31:
-            raise InputError(f"seed must lie between 0 and 2147483647, got {self.seed}")
         if self.camera is not None and self.camera.missing == "plane" and self.ppo.image_type == "uint8":
             raise InputError("camera.missing=plane needs ppo.image_type=float16: a byte has no room for the mark")
         if self.network.places and self.previous == "action":

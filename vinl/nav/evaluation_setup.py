@@ -11,6 +11,7 @@ from typing import Any
 
 from vinl.chain.navigators.base import ORACLE
 from vinl.config.errors import InputError
+from vinl.config.limits import check_fields, check_number
 from vinl.config.loader import build_config, load_config
 from vinl.nav.config import EpisodeConfig, NavConfig
 from vinl.nav.home_store import HomeStore
@@ -66,18 +67,12 @@ class NavEvaluation:
     start_clearance: float = 0.45
 
     def __post_init__(self) -> None:
-        if not 1 <= self.episodes <= 65536:
-            raise InputError(f"--episodes must lie between 1 and 65536, got {self.episodes}")
-        if not 0 <= self.seed < 2**31:
-            raise InputError(f"--seed must lie between 0 and 2147483647, got {self.seed}")
+        check_number("--episodes", self.episodes, 1, 65536)
+        check_number("--seed", self.seed, 0, 2**31 - 1)
         if self.motion not in MOTIONS:
             raise InputError(f"--motion must be one of {', '.join(MOTIONS)}, got {self.motion!r}")
-        if not 0 <= self.clutter <= 1:
-            raise InputError(f"--clutter must lie between 0 and 1, got {self.clutter:g}")
-        if not 0 <= self.drift <= 0.5:
-            raise InputError(f"--drift must lie between 0 and 0.5, got {self.drift:g}")
-        if self.steps < 1:
-            raise InputError(f"--steps must be at least 1, got {self.steps}")
+        check_number("--drift", self.drift, 0.0, 0.5)
+        check_fields(self, "--", counts=("steps",), fractions=("clutter",))
 
 
 def load_navigator(name: str, device: str) -> DepthPolicy | None:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from vinl.config.errors import InputError
+from vinl.config.limits import check_fields
 
 VISIONS, MEMORIES = ("resnet18", "cnn"), ("lstm", "mlp")
 IMAGE_TYPES = ("float16", "uint8")
@@ -41,9 +42,7 @@ class NavNetworkConfig:
             raise InputError(f"network.vision must be one of {', '.join(VISIONS)}, got {self.vision!r}")
         if self.memory not in MEMORIES:
             raise InputError(f"network.memory must be one of {', '.join(MEMORIES)}, got {self.memory!r}")
-        for name in ("planes", "visual", "embedding", "hidden", "layers"):
-            if getattr(self, name) < 1:
-                raise InputError(f"network.{name} must be at least 1, got {getattr(self, name)}")
+        check_fields(self, "network.", counts=("planes", "visual", "embedding", "hidden", "layers"))
         if self.planes % 16 and self.vision == "resnet18":
             raise InputError(f"network.planes must be a multiple of 16 (groups of the norms), got {self.planes}")
 
@@ -108,22 +107,18 @@ class NavPpoConfig:
     keep_at: tuple[float, ...] = (2.5e6, 1e7, 2e7, 5e7, 1e8, 2e8, 5e8)
 
     def __post_init__(self) -> None:
-        if min(self.steps, self.epochs, self.minibatches) < 1:
-            raise InputError("ppo: steps, epochs and minibatches must be at least 1")
-        if self.critic_warmup < 0:
-            raise InputError(f"ppo.critic_warmup must not be negative, got {self.critic_warmup}")
+        check_fields(
+            self,
+            "ppo.",
+            counts=("steps", "epochs", "minibatches"),
+            positive=("desired_kl", "last_rate", "clip", "max_grad_norm", "gamma"),
+            unsigned=("value", "entropy", "last_entropy", "places", "critic_warmup"),
+            fractions=("gamma", "lam", "cool_from"),
+        )
         if self.image_type not in IMAGE_TYPES:
             raise InputError(f"ppo.image_type must be one of {', '.join(IMAGE_TYPES)}, got {self.image_type!r}")
         if not 0 < self.min_rate <= self.learning_rate <= self.max_rate:
             raise InputError("ppo: need 0 < min_rate <= learning_rate <= max_rate")
-        for name in ("desired_kl", "last_rate", "clip", "max_grad_norm"):
-            if not getattr(self, name) > 0:
-                raise InputError(f"ppo.{name} must be positive, got {getattr(self, name)}")
-        for name in ("value", "entropy", "last_entropy", "places"):
-            if (getattr(self, name) or 0.0) < 0:
-                raise InputError(f"ppo.{name} must not be negative, got {getattr(self, name)}")
-        if not 0 < self.gamma <= 1 or not 0 <= self.lam <= 1 or not 0 <= self.cool_from <= 1:
-            raise InputError("ppo: gamma must lie in (0, 1], lam and cool_from in [0, 1]")
         low, high = self.log_std_range
         if not low <= self.log_std <= high or not math.isfinite(low + high):
             raise InputError(f"ppo.log_std must lie within log_std_range {low:g} to {high:g}, got {self.log_std:g}")

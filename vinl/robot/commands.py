@@ -8,9 +8,8 @@ from typing import Any
 from jaxtyping import Float, Int
 
 from vinl.config.errors import InputError
+from vinl.config.limits import Range, check_fields
 from vinl.robot.aliengo import CONTROL_DT
-
-Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -35,14 +34,9 @@ class CommandConfig:
     turn_share: float = 0.1
 
     def __post_init__(self) -> None:
-        for name in ("forward", "left", "yaw_rate", "hold"):
-            low, high = getattr(self, name)
-            if not low <= high:
-                raise InputError(f"commands.{name} must be a rising range, got {low} to {high}")
-        if self.hold[0] <= 0:
-            raise InputError(f"commands.hold must be positive, got {self.hold[0]}")
-        fractions = self.stand_share, self.turn_share
-        if min(fractions) < 0 or sum(fractions) > 1:
+        ranges, fractions = ("forward", "left", "yaw_rate", "hold"), ("stand_share", "turn_share")
+        check_fields(self, "commands.", rising=ranges, positive=("hold",), fractions=fractions)
+        if self.stand_share + self.turn_share > 1:
             raise InputError("commands: stand_share and turn_share must be fractions that add up to at most 1")
 
 

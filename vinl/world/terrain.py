@@ -10,6 +10,7 @@ from jaxtyping import Float
 from scipy import ndimage
 
 from vinl.config.errors import InputError
+from vinl.config.limits import check_fields
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import RESOLUTION
@@ -75,29 +76,24 @@ class TerrainConfig:
     ghost: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.levels < 1 or self.columns < 1:
-            raise InputError(f"terrain needs at least one level and column, got {self.levels} x {self.columns}")
+        heights, densities = ("block_height", "first_height", "depth"), ("block_density", "tall_density")
+        check_fields(
+            self,
+            "terrain.",
+            counts=("levels", "columns"),
+            rising=heights,
+            positive=heights,
+            unsigned=(*densities, "start_clear"),
+            fractions=("wall_blocks", "ghost"),
+        )
         fractions = self.fractions()
         if min(fractions.values()) < 0 or abs(sum(fractions.values()) - 1) > 1e-6:
             raise InputError(
                 f"terrain: the fractions of the tile types must add up to 1, got {sum(fractions.values()):.3f}"
             )
-        if not 0 < self.block_height[0] <= self.block_height[1]:
-            raise InputError(f"terrain: block_height must be a rising positive range, got {self.block_height}")
-        if self.first_height is not None and not 0 < self.first_height[0] <= self.first_height[1]:
-            raise InputError(f"terrain: first_height must be a rising positive range, got {self.first_height}")
-        if min(self.block_density, self.tall_density) < 0:
-            raise InputError("terrain: densities must not be negative")
-        if not 0 < self.depth[0] <= self.depth[1]:
-            raise InputError(f"terrain: depth must be a rising positive range, got {self.depth}")
-        for name in ("wall_blocks", "ghost"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise InputError(f"terrain: {name} must lie in [0, 1], got {getattr(self, name)}")
-        if self.start_clear < 0:
-            raise InputError("terrain: start_clear must not be negative")
 
     def fractions(self) -> dict[str, float]:
-        """Share of every tile type, in the order of the columns."""
+        """Fraction of every tile type, in the order of the columns."""
         flat = ("slope", "rough_slope", "stairs_up", "stairs_down", "discrete")
         return {name: getattr(self, name) for name in (*flat, "walls", "blocks", "rooms", "hurdles", "bars")}
 
