@@ -21,7 +21,7 @@ from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
 from vinl.robot.rotation import matrix_of, yaw_of
 from vinl.world.boxes import Boxes
-from vinl.world.clutter import CLUTTER, scatter_blocks
+from vinl.world.clutter import CLUTTER, choose_clutter, scatter_blocks
 from vinl.world.endings import MAX_TILT
 from vinl.world.floorplan import FloorPlan, assemble_floorplan, frame_around
 
@@ -69,8 +69,7 @@ def record_motion(
         InputError: an unknown preset, a number out of range, or a policy that is no locomotor.
     """
     check_locomotion_policy(policy)
-    if clutter not in CLUTTER:
-        raise InputError(f"clutter {clutter!r} is not a preset; known: {', '.join(CLUTTER)}")
+    choose_clutter(clutter, "clutter")
     if robots < 1 or not 2 <= seconds <= 3600:
         raise InputError(f"at least one robot and 2 to 3600 s, got {robots} and {seconds:g}")
     jobs = [range(first, min(first + GROUP, robots)) for first in range(0, robots, GROUP)]

@@ -174,7 +174,7 @@ def test_height_scans_come_with_their_points():
         ("export loco --steps 0", "steps must be at least 1"),
         ("export --scene harbour_flt --out home", "shipped plans"),
         ("export --scene harbour_flat --out file/home", "cannot write file/home"),
-        ("export --scene harbour_flat --out home --obstacles some", "unknown obstacles 'some'"),
+        ("export --scene harbour_flat --out home --obstacles some", "obstacles 'some' is not a preset"),
         ("export --scene harbour_flat --out home --episodes 0", "episodes must be at least 1"),
         ("export --scene harbour_flat --out home --seed -1", "seed must not be negative"),
     ],

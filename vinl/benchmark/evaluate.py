@@ -20,11 +20,10 @@ from vinl.chain.progress_line import show_line
 from vinl.chain.records import Episode, Results
 from vinl.chain.workers import WorkerPool
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
 from vinl.config.limits import check_number
 from vinl.policies.policy import Policy
 from vinl.render.video import FilmJob
-from vinl.world.clutter import CLUTTER
+from vinl.world.clutter import choose_clutter
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers import open_floorplans
 
@@ -191,7 +190,4 @@ def check_numbers(episodes: int, seeds: int, first_seed: int, obstacles: str, wo
     check_number("--seeds", seeds, 1, 1_000)
     check_number("--workers", workers, 1, 1_024)
     check_number("--first-seed", first_seed, 0, 2**31 - 1)
-    if obstacles not in CLUTTER:
-        raise InputError(
-            f"--obstacles {obstacles!r} is not a preset{closest(obstacles, CLUTTER)}; known: {', '.join(CLUTTER)}"
-        )
+    choose_clutter(obstacles)

@@ -14,7 +14,7 @@ from vinl.config.fields import closest
 from vinl.config.loader import build_config
 from vinl.policies.card import CARD_FILE
 from vinl.policies.io import list_policies
-from vinl.world.clutter import CLUTTER
+from vinl.world.clutter import choose_clutter
 
 _NAME = re.compile(r"^[a-z0-9][a-z0-9_-]*$")
 _FAULT = re.compile(r"^[a-z0-9][a-z0-9_.-]*$")
@@ -59,12 +59,7 @@ class RowConfig:
     paper: PaperFigures | None = None
 
     def __post_init__(self) -> None:
-        if self.obstacles not in CLUTTER:
-            known = ", ".join(CLUTTER)
-            raise InputError(
-                f"row {self.title!r}: obstacles {self.obstacles!r} is not a preset{closest(self.obstacles, CLUTTER)}; "
-                f"known: {known}"
-            )
+        choose_clutter(self.obstacles, f"row {self.title!r}: obstacles")
 
     @property
     def missing(self) -> str:

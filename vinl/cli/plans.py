@@ -116,14 +116,13 @@ def _generate_plans(options: GeneratePlans) -> None:
 def _show_plan(options: ShowPlan) -> None:
     import numpy as np
 
-    from vinl.world.clutter import CLUTTER, scatter_blocks
+    from vinl.world.clutter import choose_clutter, scatter_blocks
     from vinl.world.free_space import FreeSpace
     from vinl.world.geodesic import comfortable_path
     from vinl.world.readers import load_floorplan
     from vinl.world.start_goal import sample_start_goals
 
-    if options.obstacles not in CLUTTER:
-        raise InputError(f"--obstacles {options.obstacles}: choose one of {', '.join(CLUTTER)}")
+    clutter = choose_clutter(options.obstacles)
     if options.seed < 0:
         raise InputError(f"--seed {options.seed}: give a number, 0 or more")
     plan = load_floorplan(options.path, options.resolution, options.min_speck, up=options.up)
@@ -131,7 +130,7 @@ def _show_plan(options: ShowPlan) -> None:
     rng = np.random.default_rng(options.seed)
     pairs = sample_start_goals(plan, options.episodes, rng)
     points = np.array([point for pair in pairs for point in (pair.start, pair.goal)]).reshape(-1, 2)
-    blocks = scatter_blocks(plan, CLUTTER[options.obstacles], rng, points)
+    blocks = scatter_blocks(plan, clutter, rng, points)
     rows, columns = plan.frame.shape
     print(f"{plan.name}: {plan.area_m2:.1f} m2 of free floor in {plan.source}")
     print(f"  grid      {columns * plan.frame.resolution:.1f} m x {rows * plan.frame.resolution:.1f} m")

@@ -13,7 +13,7 @@ from vinl.chain.episode import EpisodeSetup, draw_routes, draw_setups
 from vinl.chain.scene import scene_spec
 from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
-from vinl.world.clutter import CLUTTER
+from vinl.world.clutter import choose_clutter
 from vinl.world.floorplan import FloorPlan
 
 HOME_FILE, EPISODES_FILE = "home.xml", "episodes.json"
@@ -44,14 +44,13 @@ def export_home(
     Raises:
         InputError: unknown clutter, no such number of episodes, or the folder cannot be written.
     """
-    if obstacles not in CLUTTER:
-        raise InputError(f"unknown obstacles {obstacles!r}; known: {', '.join(CLUTTER)}")
+    clutter = choose_clutter(obstacles, "obstacles")
     if episodes < 1:
         raise InputError(f"episodes must be at least 1, got {episodes}")
     if seed < 0:
         raise InputError(f"seed must not be negative, got {seed}")
     rules = config or EvaluationConfig()
-    setups = draw_setups(plan, draw_routes(plan, episodes, rules), seed, CLUTTER[obstacles], rules)
+    setups = draw_setups(plan, draw_routes(plan, episodes, rules), seed, clutter, rules)
     folder, spec = Path(out), scene_spec(plan.boxes, Boxes.empty())
     spec.modelname, spec.comment = plan.name, ""
     tasks = {

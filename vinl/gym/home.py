@@ -29,7 +29,7 @@ from vinl.policies.card import navigation_table
 from vinl.policies.policy import Policy
 from vinl.policies.velocity_range import VelocityRange
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
-from vinl.world.clutter import CLUTTER
+from vinl.world.clutter import choose_clutter
 from vinl.world.floorplan import FloorPlan
 from vinl.world.free_space import FreeSpace
 from vinl.world.readers import open_floorplans
@@ -128,15 +128,12 @@ class HomeEnv(gymnasium.Env):
             raise InputError(f"render_mode is 'rgb_array' or None, not {render_mode!r}")
         if control not in CONTROLS:
             raise InputError(f"control is {' or '.join(CONTROLS)}, not {control!r}")
-        if obstacles not in CLUTTER:
-            known = ", ".join(CLUTTER)
-            raise InputError(f"obstacles {obstacles!r} is no preset{closest(obstacles, CLUTTER)}; known: {known}")
         if not 0 < joint_reach <= 10:
             raise InputError(f"joint_reach must lie in (0, 10] rad, got {joint_reach}")
         self.render_mode, self._joints, self._reach = render_mode, control == "joints", joint_reach
         self._rules = rules if isinstance(rules, EvaluationConfig) else load_config(EvaluationConfig, rules)
         navigation = load_config(NavConfig, config, overrides)
-        self._reward, self._clutter = navigation.reward, CLUTTER[obstacles]
+        self._reward, self._clutter = navigation.reward, choose_clutter(obstacles, "obstacles")
         self._knows = navigation.previous
         self._spaces = [FreeSpace(plan) for plan in _load_plans(floorplans)]
         self._legs = self._guide = None

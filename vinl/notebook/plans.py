@@ -11,10 +11,8 @@ import numpy as np
 from jaxtyping import Float
 from PIL import Image
 
-from vinl.config.errors import InputError
-from vinl.config.fields import closest
 from vinl.world.blocks import Blocks
-from vinl.world.clutter import CLUTTER, ClutterPreset, scatter_blocks
+from vinl.world.clutter import ClutterPreset, choose_clutter, scatter_blocks
 from vinl.world.drawing import draw_floorplan
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers import load_floorplan
@@ -64,10 +62,7 @@ def scatter_clutter(
         InputError: there is no preset of that name.
     """
     if isinstance(preset, str):
-        if preset not in CLUTTER:
-            known = ", ".join(CLUTTER)
-            raise InputError(f"clutter {preset!r} is no preset{closest(preset, CLUTTER)}; known: {known}")
-        preset = CLUTTER[preset]
+        preset = choose_clutter(preset, "clutter")
     clear = np.array([point for route in routes for point in (route.start, route.goal)]).reshape(-1, 2)
     return scatter_blocks(open_plan(plan), preset, np.random.default_rng(seed), clear)
 

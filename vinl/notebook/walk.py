@@ -29,7 +29,7 @@ from vinl.render.video import POSE_DT
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
 from vinl.world.blocks import Blocks
-from vinl.world.clutter import CLUTTER
+from vinl.world.clutter import choose_clutter
 from vinl.world.floorplan import FloorPlan
 from vinl.world.start_goal import StartGoal
 
@@ -158,14 +158,12 @@ def walk(
         InputError: a name is unknown, or a policy answered what is no answer.
     """
     rules, home = config or EvaluationConfig(), open_plan(plan)
-    if obstacles not in CLUTTER:
-        known = ", ".join(CLUTTER)
-        raise InputError(f"obstacles {obstacles!r} is no preset{closest(obstacles, CLUTTER)}; known: {known}")
+    clutter = choose_clutter(obstacles, "obstacles")
     if episode < 0 or seed < 0:
         raise InputError(f"episode and seed must not be negative, got {episode} and {seed}")
     legs, guide = choose_locomotor(locomotor), choose_navigator(navigator, rules)
     route = draw_routes(home, episode + 1, rules)[episode]
-    setup = draw_setup(home, route, episode, seed, CLUTTER[obstacles], rules)
+    setup = draw_setup(home, route, episode, seed, clutter, rules)
     decisions = count()
     with one_thread(), show_line("walking", "s") as show:
 

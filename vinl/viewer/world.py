@@ -16,7 +16,7 @@ from vinl.courses.grounds import DENSITY, GroundConfig, build_ground
 from vinl.robot.aliengo import DEFAULT_POSE, KD, KP, LENGTH
 from vinl.world.blocks import Blocks
 from vinl.world.boxes import Boxes
-from vinl.world.clutter import CLUTTER, ClutterPreset, scatter_blocks
+from vinl.world.clutter import CLUTTER, choose_clutter, scatter_blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.grid import GridFrame
 
@@ -75,18 +75,6 @@ class World:
     def scattered(self, preset: str, rng: np.random.Generator, robot: Float[np.ndarray, "2"]) -> World:
         """With clutter drawn anew, none of it near the robot, whose middle is at ``robot`` [m]."""
         return self.with_blocks(scatter_blocks(self.plan, choose_clutter(preset), rng, robot[None]))
-
-
-def choose_clutter(preset: str) -> ClutterPreset:
-    """A preset of clutter by its name.
-
-    Raises:
-        InputError: there is none of that name.
-    """
-    if preset not in CLUTTER:
-        known = ", ".join(CLUTTER)
-        raise InputError(f"--obstacles {preset!r} is not a preset{closest(preset, CLUTTER)}; known: {known}")
-    return CLUTTER[preset]
 
 
 def draw_block(xy: Float[np.ndarray, "2"], rng: np.random.Generator) -> Blocks:

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from vinl.config.errors import InputError
+from vinl.config.fields import closest
 from vinl.world.blocks import Blocks
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 
@@ -42,6 +44,17 @@ CLUTTER = {
     "dense": ClutterPreset(density=1.5, spacing=0.5),
 }
 """Presets by name. ``paper``: sizes, density, spacing and clear circles of [paper, IV-C]; ``dense``: more of it."""
+
+
+def choose_clutter(name: str, what: str = "--obstacles") -> ClutterPreset:
+    """A preset by its name; ``what`` stands before it in the error.
+
+    Raises:
+        InputError: there is none of that name.
+    """
+    if name not in CLUTTER:
+        raise InputError(f"{what} {name!r} is not a preset{closest(name, CLUTTER)}; known: {', '.join(CLUTTER)}")
+    return CLUTTER[name]
 
 
 def scatter_blocks(
