@@ -6,10 +6,9 @@ from pathlib import Path
 import pytest
 
 from vinl.policies.card import PolicyCard, locomotion_card
-from vinl.policies.commit import find_commit
 from vinl.policies.identity import digest_weights
 from vinl.policies.io import load_policy, save_policy
-from vinl.policies.lineage import trace_lineage
+from vinl.policies.lineage import find_commit, trace_lineage
 from vinl.policies.networks import MapActor
 
 

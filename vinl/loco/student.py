@@ -19,8 +19,8 @@ from vinl.loco.student_config import StudentConfig
 from vinl.loco.vec_env import SightedVecEnv
 from vinl.loco.warm_start import load_teacher
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
-from vinl.policies.commit import find_commit
 from vinl.policies.io import save_policy
+from vinl.policies.lineage import find_commit
 from vinl.policies.networks import StepActor
 from vinl.policies.stepping_actor import SteppingActor
 from vinl.rl.loop import TrainingLoop

@@ -19,8 +19,8 @@ from vinl.loco.runner import TrainingRunner
 from vinl.loco.vec_env import LocoVecEnv
 from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
-from vinl.policies.commit import find_commit
 from vinl.policies.io import save_policy
+from vinl.policies.lineage import find_commit
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
 
 WARMUP_RATE = 1e-3

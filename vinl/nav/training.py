@@ -21,9 +21,8 @@ from vinl.nav.recurrent_model import RecurrentActorCritic
 from vinl.nav.recurrent_ppo import RecurrentPPO, build_storage, count_guesses
 from vinl.nav.warm_start import build_actor, load_critic, load_start, save_critic
 from vinl.policies.card import PolicyCard, navigation_card
-from vinl.policies.commit import find_commit
 from vinl.policies.io import save_policy
-from vinl.policies.lineage import trace_lineage
+from vinl.policies.lineage import find_commit, trace_lineage
 from vinl.policies.nav_actor import NavActor
 from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers, join_peers

@@ -1,9 +1,13 @@
-"""Every training behind a policy: what it learned from in all, by samples, commit and digest of the weights."""
+"""Every training behind a policy: what it learned from in all, by samples, commit of the code and digest of the
+weights."""
 
 from __future__ import annotations
 
+import os
+import subprocess
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from torch import Tensor
@@ -56,3 +60,23 @@ def with_lineage(card: PolicyCard, weights: Mapping[str, Tensor]) -> PolicyCard:
 
 def _own_row(card: PolicyCard, digest: str) -> dict[str, Any]:
     return {"training": card.name, "samples": card.samples, "commit": card.commit, "weights_sha256": digest}
+
+
+def find_commit() -> str:
+    """The git commit of this checkout, with ``+`` when it was changed; empty outside a checkout.
+
+    The environment variable ``VINL_COMMIT`` names it where the code runs without its repository, as in a container.
+    """
+    if given := os.environ.get("VINL_COMMIT"):
+        return given
+    here = Path(__file__).resolve().parent
+    try:
+        commit = _git(here, "rev-parse", "--short", "HEAD")
+        return commit + ("+" if _git(here, "status", "--porcelain", "--untracked-files=no") else "")
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+
+
+def _git(folder: Path, *command: str) -> str:
+    done = subprocess.run(["git", "-C", str(folder), *command], capture_output=True, text=True, check=True)
+    return done.stdout.strip()

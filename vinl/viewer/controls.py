@@ -1,4 +1,5 @@
-"""The panel of a live session: what one can press, slide and type. A control only asks the session for something."""
+"""The panels of a live session and of a recording: what one can press, slide and type. A control only asks the
+session for something."""
 
 from __future__ import annotations
 
@@ -14,6 +15,7 @@ from vinl.policies.policy import Policy
 from vinl.viewer.requests import (
     ChangePolicies,
     Drive,
+    OpenEpisode,
     OpenPlan,
     Pause,
     PlaceRobot,
@@ -21,6 +23,7 @@ from vinl.viewer.requests import (
     Request,
     Reset,
     ScatterClutter,
+    Seek,
     SetGoal,
     SetPace,
     StepOnce,
@@ -163,3 +166,49 @@ class Controls:
         add("N", "One step", lambda: self._ask(StepOnce()))
         add("R", "Reset", lambda: self._ask(Reset()))
         add("H", "Push", lambda: self._ask(self._draw_push()))
+
+
+class ReplayControls:
+    """The panel of a recording.
+
+    Args:
+        gui: of a viser server.
+        ask: puts a request into the session's queue.
+        labels: of the episodes.
+        number: of the one that is shown.
+    """
+
+    def __init__(
+        self, gui: viser.GuiApi, ask: Callable[[Request], None], labels: Sequence[str], number: int, snapshot: Snapshot
+    ) -> None:
+        self._paused = snapshot.paused
+        actions: dict[str, Callable[[], Request]] = {
+            "Play / pause": lambda: Pause(not self._paused),
+            "Step": StepOnce,
+            "From the start": Reset,
+        }
+        self._time = gui.add_slider("Time [s]", 0.0, _end_of(snapshot), 0.04, 0.0)
+        self._time.on_update(lambda event: ask(Seek(float(event.target.value))) if event.client is not None else None)
+        buttons = gui.add_button_group("Recording", tuple(actions))
+        buttons.on_click(lambda event: ask(actions[event.target.value]()))
+        pace = gui.add_slider("Pace of time", PACES[0], PACES[1], 0.05, 1.0, marks=((1.0, "real time"),))
+        pace.on_update(lambda event: ask(SetPace(float(event.target.value))))
+        chosen = gui.add_dropdown("Episode", tuple(labels), initial_value=labels[number])
+        chosen.on_update(lambda event: ask(OpenEpisode(labels.index(event.target.value))))
+        for key, text, act in (
+            ("P", "Play or pause", actions["Play / pause"]),
+            ("N", "One step", StepOnce),
+            ("R", "From the start", Reset),
+        ):
+            gui.add_command(text, hotkey=key).on_trigger(lambda _, act=act: ask(act()))  # type: ignore[arg-type]
+
+    def follow(self, snapshot: Snapshot) -> None:
+        """Show how far the recording is."""
+        self._paused = snapshot.paused
+        if self._time.max != _end_of(snapshot):
+            self._time.max = _end_of(snapshot)
+        self._time.value = round(min(snapshot.time_s, _end_of(snapshot)), 2)
+
+
+def _end_of(snapshot: Snapshot) -> float:
+    return max(round(snapshot.duration_s or 0.0, 2), 0.04)

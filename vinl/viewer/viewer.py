@@ -18,9 +18,8 @@ from vinl.chain.navigators.base import Navigator
 from vinl.config.errors import InputError
 from vinl.policies.policy import Policy
 from vinl.render.panels import colour_depth
-from vinl.viewer.controls import CLICKS, Controls
+from vinl.viewer.controls import CLICKS, Controls, ReplayControls
 from vinl.viewer.panel_text import render_status
-from vinl.viewer.replay_controls import ReplayControls
 from vinl.viewer.scene_view import LAYERS, SceneView
 from vinl.viewer.session import Session
 from vinl.viewer.snapshot import Snapshot
