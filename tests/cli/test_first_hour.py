@@ -15,6 +15,9 @@ from rich.console import Console
 from vinl.cli.app import COMMANDS, main
 from vinl.cli.options import default_out
 from vinl.config.errors import InputError
+from vinl.courses.evaluate import TrialResults
+from vinl.courses.report import _COLUMNS, print_comparison
+from vinl.nav.training import describe_figures
 from vinl.rl.out_of_memory import explain_out_of_memory
 from vinl.rl.progress import TrainingProgress
 from vinl.rl.run_folder import RunFolder
@@ -198,3 +201,18 @@ def test_full_disk_is_one_line(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-B", "-c", code], capture_output=True, text=True)
     assert done.returncode == 2 and "Traceback" not in done.stderr, done.stderr
     assert done.stderr.startswith("error: ") and "make room" in done.stderr
+
+
+def test_progress_of_a_navigation_training_is_read_by_people() -> None:
+    row = {"samples_per_second": 12.3, "samples": 32.0, "learning_rate": 0.00055, "success": 0.5}
+    assert describe_figures(row) == {"samples/s": "12", "samples": "32", "success": "0.500", "rate": "0.00055"}
+    assert describe_figures({**row, "samples": 2.5e6})["samples"] == "2.5 M"
+
+
+def test_names_of_compared_policies_stay_whole_at_80_columns() -> None:
+    names, figures = ("rough", "no_pretraining"), {key: 10.0 for key, _, _ in _COLUMNS}
+    aggregate = {**figures, "falls": 0.1, "ci95": dict.fromkeys(figures, (0.0, 20.0))}
+    results = TrialResults([], aggregate, {}, {"ground": {"terrain": "blocks"}}, 0.0)
+    said = io.StringIO()
+    print_comparison(Console(width=80, file=said), dict.fromkeys(names, results))
+    assert " no_pretraining " in said.getvalue()

@@ -87,7 +87,9 @@ def check_run(folder: str, kind: str, iterations: int | None) -> None:
         raise InputError(f"{folder} is a {found} run: use {COMMANDS[found]} --resume {folder}")
     done = count_iterations(run.path)
     if iterations is not None and done >= iterations:
-        raise InputError(f"{folder} already has {done} iterations; give more with --iterations")
+        raise InputError(
+            f"{folder} already has {done} iteration{'s' if done != 1 else ''}; give more with --iterations"
+        )
 
 
 def count_iterations(folder: Path) -> int:

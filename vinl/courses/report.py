@@ -105,10 +105,12 @@ def print_comparison(console: Console, compared: Mapping[str, TrialResults[Robot
         a, cells = results.aggregate, []
         for key, _, digits in columns:
             value, interval, factor = a.get(key), a["ci95"].get(key), 100 if key.startswith("dirty") else 1
-            spread = f" ±{factor * (interval[1] - interval[0]) / 2:.{digits}f}" if interval and key in _SPREAD else ""
+            spread = f" ±{factor * (interval[1] - interval[0]) / 2:.1f}" if interval and key in _SPREAD else ""
             cells.append("-" if value is None else f"{factor * value:.{digits}f}{spread}")
         table.add_row(name, *cells, f"{100 * a['falls']:.1f} %")
     console.print(table)
+    over = "" if littered else "; over: trunk above blocks, relative to their area"
+    console.print(f"m/s, rad/s: RMSE against the command{over}; fell: robots", soft_wrap=True)
     print_gait(console, {name: results.aggregate for name, results in compared.items()})
     _print_heights(console, compared)
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from rich.console import Console
 from tensordict import TensorDict
@@ -207,11 +208,15 @@ def train_navigator(
 
 def describe_figures(row: dict[str, float]) -> dict[str, str]:
     """What the progress bar shows."""
-    shown = {"samples/s": f"{row['samples_per_second']:,.0f}", "samples": f"{row['samples'] / 1e6:.1f} M"}
+    shown = {"samples/s": f"{row['samples_per_second']:,.0f}", "samples": _say_count(row["samples"])}
     for key, digits in (("success", 3), ("spl", 3), ("collisions", 1)):
         if key in row:
             shown[key] = f"{row[key]:.{digits}f}"
-    return {**shown, "rate": f"{row['learning_rate']:.1e}"}
+    return {**shown, "rate": np.format_float_positional(row["learning_rate"], 2, fractional=False)}
+
+
+def _say_count(samples: float) -> str:
+    return f"{samples / 1e6:.1f} M" if samples >= 1_000_000 else f"{samples:,.0f}"
 
 
 def name_samples(count: float) -> str:
