@@ -27,8 +27,8 @@ class RewardConfig:
         vertical_velocity: vertical speed squared.
         roll_pitch_rate: squared rates of roll and pitch.
         orientation: squared tilt of the trunk.
-        base_height: 1 - exp(-error^2 / (3 cm)^2) of the trunk's height over the feet that stand, against
-            the gait's: footholds are chosen for legs that hang from there.
+        hip_height: 1 - exp(-error^2 / (2 cm)^2) of each hip's height over its foot that stands, against the gait's:
+            footholds are chosen for legs that hang from there.
         torque: squared joint torques.
         joint_acceleration: squared joint accelerations.
         joint_speed: squares of what joint speeds exceed 0.9 of the data sheet's by [(rad/s)^2].
@@ -53,7 +53,7 @@ class RewardConfig:
     vertical_velocity: float = -0.5
     roll_pitch_rate: float = -0.05
     orientation: float = -0.5
-    base_height: float = 0.0
+    hip_height: float = 0.0
     torque: float = -1e-5
     joint_acceleration: float = -2.5e-7
     joint_speed: float = 0.0

@@ -28,6 +28,8 @@ from vinl.gait.state import (
 from vinl.loco.rewards import MIDDLE
 from vinl.loco.simulation import SHANK_REACH, Body, DeviceGround
 from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS
+from vinl.robot.kinematics import HIPS
+from vinl.robot.rotation import rotate_inverse
 from vinl.world.grid import GridFrame
 
 _ALONG_SHANK = (0.12, 0.25, 0.4, 0.6, 0.8)
@@ -55,7 +57,7 @@ class Steps(NamedTuple):
         gap: (n, 4) from each leg below the knee to the nearest block or wall [m].
         blocked: (n, 4) swinging feet whose foothold is on a block or nearer to one than ``gait.edge``.
         speed: (n, 4) of the feet along the ground [m/s].
-        height_error: (n,) of the trunk over the feet that stand, against the gait's [m].
+        height_error: (n, 4) of each hip over its foot, against the gait's [m]; 0 of feet that swing.
     """
 
     path_error: Float[Array, "n 4 3"]
@@ -64,7 +66,7 @@ class Steps(NamedTuple):
     gap: Float[Array, "n 4"]
     blocked: Bool[Array, "n 4"]
     speed: Float[Array, "n 4"]
-    height_error: Float[Array, " n"]
+    height_error: Float[Array, "n 4"]
 
 
 def start_walk(config: GaitConfig, body: Body) -> Walk:
@@ -101,8 +103,8 @@ def go_on(
 
     swing, fraction = swings(jnp, config, gait), swing_fraction(jnp, config, gait.period)[:, None]
     progress = gait.phases / fraction
-    stands = jnp.where(swing, 0.0, 1.0)
-    below = jnp.sum(stands * feet[..., 2], 1) / jnp.maximum(stands.sum(1), 1.0)
+    down = jnp.broadcast_to(jnp.array([0.0, 0.0, -1.0]), (len(feet), 3))
+    hips = -rotate_inverse(jnp, body.qpos[:, 3:7], down) @ jnp.asarray(HIPS.T, jnp.float32)  # above the trunk's middle
     last = feet_in_heading_frame(jnp, before.qpos)
     turned = moved[:, None, 3:]
     carried = last[..., :2] - moved[:, None, :2]
@@ -115,7 +117,7 @@ def go_on(
         gap=_leg_gap(view, body, feet),
         blocked=swing & (view.clearance(gait.target) - FOOT_RADIUS < config.edge),
         speed=jnp.hypot(feet[..., 0] - x, feet[..., 1] - y) / CONTROL_DT,
-        height_error=FOOT_RADIUS - below - gait.hip,
+        height_error=jnp.where(swing, 0.0, hips - feet[..., 2] + FOOT_RADIUS - gait.hip[:, None]),
     )
     return Walk(gait, plan), steps
 
