@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from vinl.robot.cameras import Camera as Camera
     from vinl.viewer.play import play as play
     from vinl.viewer.play import replay as replay
-    from vinl.world.blocks import Blocks as Blocks
+    from vinl.world.boxes import Blocks as Blocks
     from vinl.world.boxes import Boxes as Boxes
     from vinl.world.floorplan import FloorPlan as FloorPlan
     from vinl.world.homes import generate_home as generate_home
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from vinl.world.readers import shipped_floorplans as shipped_floorplans
 
 _WHERE = {
-    "Blocks": "vinl.world.blocks",
+    "Blocks": "vinl.world.boxes",
     "Boxes": "vinl.world.boxes",
     "Camera": "vinl.robot.cameras",
     "EvaluationConfig": "vinl.chain.config",

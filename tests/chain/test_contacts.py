@@ -9,8 +9,7 @@ from vinl.chain.robot import Robot
 from vinl.chain.scene import build_scene
 from vinl.robot.aliengo import DEFAULT_POSE
 from vinl.world.boxes import Boxes
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import flat_field
+from vinl.world.grid import GridFrame, flat_field
 
 NONE = Boxes.empty()
 

@@ -10,7 +10,7 @@ from vinl.robot.aliengo import home_qpos
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
 from vinl.robot.rotation import matrix_of
 from vinl.sensing.depth import DepthCamera
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.mesh import floorplan_mesh
 

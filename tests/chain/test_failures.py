@@ -8,7 +8,7 @@ from small_home import RECORD
 
 from vinl.chain.contacts import KINDS
 from vinl.chain.failures import FAILURES, count_failures, find_cause, measure_distance, read_failure
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.endings import END_REASONS, name_late_end
 from vinl.world.floorplan import FloorPlan
 from vinl.world.free_space import FreeSpace

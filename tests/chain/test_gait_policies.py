@@ -19,8 +19,7 @@ from vinl.policies.networks import PolicyNetwork, StepActor
 from vinl.policies.policy import LocomotionPolicy
 from vinl.policies.stepping_actor import SteppingActor
 from vinl.robot.aliengo import home_qpos
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.floorplan import FloorPlan, assemble_floorplan
 from vinl.world.grid import GridFrame
 

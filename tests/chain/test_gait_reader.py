@@ -8,8 +8,7 @@ import pytest
 from vinl.chain.gait_reader import GaitReader, map_plan
 from vinl.gait.config import GaitConfig
 from vinl.robot.aliengo import CONTROL_DT, home_qpos
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.floorplan import FloorPlan, assemble_floorplan
 from vinl.world.grid import GridFrame
 

@@ -6,7 +6,7 @@ from vinl.chain.scan_reader import ScanReader
 from vinl.robot.aliengo import home_qpos
 from vinl.robot.observation import SCAN_POINTS
 from vinl.sensing.detour import DetourConfig
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.floorplan import FloorPlan
 
 

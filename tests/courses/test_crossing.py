@@ -16,7 +16,7 @@ from vinl.courses.herd import BoxHerd
 from vinl.policies.io import load_policy
 from vinl.policies.policy import LocomotionPolicy
 from vinl.robot.aliengo import CONTROL_DT, home_qpos
-from vinl.world.heightfield import BLOCK, WALL
+from vinl.world.grid import BLOCK, WALL
 
 LOW = BarConfig(height=0.1, depth=0.2, speed=0.8, seed=0, kp=40.0, kd=2.0)
 

@@ -16,8 +16,7 @@ from vinl.policies.policy import LocomotionPolicy
 from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP, home_qpos
 from vinl.robot.cameras import LOCOMOTION_CAMERA
 from vinl.robot.observation import PROPRIOCEPTION
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import HeightField
+from vinl.world.grid import GridFrame, HeightField
 
 FRAME = GridFrame(-2.0, -2.0, 0.1, (41, 41))
 

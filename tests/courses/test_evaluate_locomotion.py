@@ -12,8 +12,7 @@ from vinl.courses.herd import BoxHerd
 from vinl.courses.robot_records import RobotRecord, aggregate_robots
 from vinl.policies.policy import LocomotionPolicy
 from vinl.robot.aliengo import DEFAULT_POSE
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 
 
 def test_same_numbers_from_two_processes(trotting: LocomotionPolicy) -> None:

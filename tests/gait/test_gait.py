@@ -33,8 +33,7 @@ from vinl.gait.state import (
 from vinl.robot.aliengo import CONTROL_DT, home_qpos
 from vinl.robot.kinematics import HIPS, LINK
 from vinl.world.boxes import Boxes
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import BLOCK, flat_field, raise_boxes
+from vinl.world.grid import BLOCK, GridFrame, flat_field, raise_boxes
 
 CONFIG = GaitConfig()
 

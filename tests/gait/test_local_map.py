@@ -8,8 +8,7 @@ import torch
 from vinl.gait.ground_view import FieldView, build_ground_map
 from vinl.gait.local_map import POINTS, LocalMapView
 from vinl.world.boxes import Boxes
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import BLOCK, flat_field, raise_boxes
+from vinl.world.grid import BLOCK, GridFrame, flat_field, raise_boxes
 
 
 def test_distances_and_heights_agree_with_those_of_the_world() -> None:

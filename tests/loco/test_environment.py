@@ -16,8 +16,7 @@ from vinl.robot.aliengo import DEFAULT_POSE, home_qpos
 from vinl.robot.observation import observe
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.boxes import Boxes
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import BLOCK, WALL, flat_field, raise_boxes
+from vinl.world.grid import BLOCK, WALL, GridFrame, flat_field, raise_boxes
 
 
 @pytest.fixture(scope="module")

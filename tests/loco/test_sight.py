@@ -10,8 +10,7 @@ import torch
 from vinl.loco.sight import Sight, patch_mesh, terrain_mesh
 from vinl.loco.student_config import CameraConfig, SightConfig
 from vinl.robot.cameras import LOCOMOTION_CAMERA
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import GROUND
+from vinl.world.grid import GROUND, GridFrame
 from vinl.world.terrain import Terrain, TerrainConfig, build_terrain
 
 EXACT = SightConfig(position=0.0, angle=0.0, zoom=0.0, scale=0.0, noise=0.0, holes=0.0, delay=(0.0, 0.0))

@@ -14,7 +14,7 @@ from vinl.nav.fields import measure_near_clearance, spread_fields
 from vinl.nav.home_builder import FIELD_RESOLUTION, build_home, prepare_home
 from vinl.nav.home_store import HomeStore
 from vinl.world.floorplan import measure_clearance
-from vinl.world.geodesic import distance_field
+from vinl.world.free_space import distance_field
 from vinl.world.grid import GridFrame
 from vinl.world.readers import load_floorplan
 

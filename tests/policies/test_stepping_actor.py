@@ -19,8 +19,7 @@ from vinl.policies.stepping_actor import Memory, Prediction, SteppingActor
 from vinl.robot.aliengo import DEFAULT_POSE, home_qpos
 from vinl.robot.rotation import rotate_inverse
 from vinl.world.boxes import Boxes
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import BLOCK, flat_field, raise_boxes
+from vinl.world.grid import BLOCK, GridFrame, flat_field, raise_boxes
 
 N = 3
 SMALL = {"vision": "none", "hidden": 16, "layers": 1, "actor": [16, 8]}

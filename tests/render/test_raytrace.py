@@ -9,8 +9,7 @@ from vinl.render.raytrace import RayRenderer, look_at
 from vinl.render.robot_shape import RobotShape
 from vinl.render.scene import BLOCK, GOAL, plain_scene, plan_scene
 from vinl.robot.aliengo import home_qpos
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.grid import GridFrame
 
 FRAME = GridFrame(-10.0, -10.0, 1.0, (21, 21))

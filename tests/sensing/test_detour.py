@@ -13,8 +13,7 @@ from vinl.config.errors import InputError
 from vinl.robot.aliengo import home_qpos
 from vinl.sensing.detour import STANCE, DetourConfig, bend_command, keep_out, plan_detours
 from vinl.world.boxes import Boxes
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
+from vinl.world.grid import BLOCK, WALL, GridFrame, HeightField, flat_field, raise_boxes
 
 CONFIG = DetourConfig()
 FRAME = GridFrame(-4.0, -4.0, 0.05, (161, 161))

@@ -7,7 +7,7 @@ import torch
 from vinl.robot.cameras import LOCOMOTION_CAMERA
 from vinl.robot.rotation import matrix_of
 from vinl.sensing.depth import DepthCamera, PreparedRender
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.mesh import floorplan_mesh
 from vinl.world.readers import load_floorplans
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vinl.config.errors import InputError
-from vinl.world.geodesic import comfortable_path, distance_field, path_length, read_field
+from vinl.world.free_space import comfortable_path, distance_field, path_length, read_field
 from vinl.world.grid import GridFrame
 
 FRAME = GridFrame(0.0, 0.0, 0.05, (80, 120))

@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from vinl.world.heightfield import BLOCK
-from vinl.world.terrain import TILE, TerrainConfig, build_terrain
-from vinl.world.tiles import draw_bars, draw_hurdles
+from vinl.world.grid import BLOCK
+from vinl.world.terrain import TILE, TerrainConfig, build_terrain, draw_bars, draw_hurdles
 
 
 @given(st.integers(0, 10**6))

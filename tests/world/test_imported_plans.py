@@ -11,7 +11,7 @@ from vinl.world.homes import generate_home
 from vinl.world.mesh import box_mesh, floorplan_mesh, join_meshes
 from vinl.world.readers import load_floorplan, load_floorplans
 from vinl.world.readers.houseexpo import find_crossing
-from vinl.world.writer import write_floorplan
+from vinl.world.readers.own import write_floorplan
 
 
 def free_at(plan, x, y):

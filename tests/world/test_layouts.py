@@ -8,8 +8,7 @@ from vinl.world.floorplan import measure_clearance
 from vinl.world.free_space import FIT_RADIUS
 from vinl.world.homes import generate_home
 from vinl.world.homes.config import HomeConfig, layout_config
-from vinl.world.homes.generate import draw_shell
-from vinl.world.homes.judging import JUDGING_SETS, RESERVED_FROM, JudgingSet, find_judging_set
+from vinl.world.homes.generate import JUDGING_SETS, RESERVED_FROM, JudgingSet, draw_shell, find_judging_set
 from vinl.world.raster import label_regions
 
 

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.floorplan import FloorPlan
 from vinl.world.grid import GridFrame
 from vinl.world.mesh import box_mesh, floor_mesh, floorplan_mesh, heightfield_mesh

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from vinl.world.terrain import TILE, TerrainConfig, build_terrain
-from vinl.world.tiles import draw_rooms
+from vinl.world.terrain import TILE, TerrainConfig, build_terrain, draw_rooms
 
 
 @given(st.integers(0, 10**6), st.floats(0, 1))

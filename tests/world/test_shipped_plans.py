@@ -4,8 +4,7 @@ import pytest
 from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
 from vinl.world.drawing import draw_floorplan, save_floorplan
-from vinl.world.free_space import FreeSpace
-from vinl.world.geodesic import distance_field
+from vinl.world.free_space import FreeSpace, distance_field
 from vinl.world.raster import paint_boxes
 from vinl.world.readers import load_floorplan, load_floorplans, shipped_floorplans
 from vinl.world.start_goal import sample_start_goals

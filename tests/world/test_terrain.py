@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import BLOCK, GROUND, WALL, HeightField, flat_field, raise_boxes
+from vinl.world.grid import BLOCK, GROUND, WALL, GridFrame, HeightField, flat_field, raise_boxes
 from vinl.world.terrain import (
     CELLS,
     RESOLUTION,

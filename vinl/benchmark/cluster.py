@@ -13,7 +13,7 @@ import torch
 
 from vinl.chain.workers import Context
 from vinl.config.errors import InputError
-from vinl.config.versions import list_packages
+from vinl.config.output import list_packages
 
 T = TypeVar("T")
 

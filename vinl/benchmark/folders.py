@@ -27,10 +27,8 @@ from vinl.benchmark.table_config import PaperFigures, RowConfig, TableConfig
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.records import Results, plain_record
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
-from vinl.config.loader import build_config
-from vinl.config.output import SCHEMA, write_json, write_text
-from vinl.config.versions import describe_environment
+from vinl.config.loader import build_config, closest
+from vinl.config.output import SCHEMA, describe_environment, write_json, write_text
 from vinl.render.video import name_film
 
 RESULTS_FILE, REPORT_FILE, TABLE_FILE = "results.json", "report.html", "table.json"

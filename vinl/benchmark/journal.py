@@ -16,7 +16,7 @@ from vinl.config.errors import InputError
 from vinl.config.output import write_json
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers import load_floorplan
-from vinl.world.writer import write_floorplan
+from vinl.world.readers.own import write_floorplan
 
 RUN_FILE, EPISODES_FILE, PLANS = "run.json", "episodes.jsonl", "plans"
 SCHEMA = 1

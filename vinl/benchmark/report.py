@@ -15,7 +15,7 @@ from vinl.benchmark.table_config import PaperFigures, TableConfig
 from vinl.chain.failures import FAILURES, read_failure
 from vinl.chain.records import EpisodeRecord, Results
 from vinl.config.loader import load_config
-from vinl.config.versions import describe_environment
+from vinl.config.output import describe_environment
 from vinl.render.drawing import POINT_DT, draw_histogram, draw_map
 from vinl.render.page import format_number, open_table, render_page
 

@@ -10,8 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
-from vinl.config.yaml_text import read_yaml
+from vinl.config.loader import closest, read_yaml
 from vinl.world.floorplan import FloorPlan
 from vinl.world.free_space import FreeSpace
 from vinl.world.start_goal import StartGoal, measure_route

@@ -18,7 +18,7 @@ from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.chain.navigators.recovery import RecoveringNavigator
 from vinl.chain.records import Episode, Key, Results
-from vinl.config.versions import list_packages
+from vinl.config.output import list_packages
 from vinl.policies.identity import describe_policy
 from vinl.render.video import name_film
 from vinl.world.floorplan import FloorPlan

@@ -10,8 +10,7 @@ from typing import Any
 from vinl.benchmark.metrics import aggregate_episodes, compare_rows
 from vinl.benchmark.table_config import IDEAL, PaperFigures
 from vinl.chain.records import Results
-from vinl.config.output import SCHEMA
-from vinl.config.versions import describe_environment
+from vinl.config.output import SCHEMA, describe_environment
 
 PLAN_FIGURES = ("success", "spl", "distance_m", "foot_collisions_per_m", "paper_foot_collisions_per_m")
 """Figures that the summary has for each floor plan too."""

@@ -10,8 +10,7 @@ from pathlib import Path
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.navigators.base import ORACLE
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
-from vinl.config.loader import build_config
+from vinl.config.loader import build_config, closest
 from vinl.policies.card import CARD_FILE
 from vinl.policies.io import list_policies
 from vinl.world.clutter import choose_clutter

@@ -13,7 +13,7 @@ from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.chain.navigators.recovery import RecoveringNavigator
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
+from vinl.config.loader import closest
 from vinl.gait.observation import SENSED_TABLE
 from vinl.policies.card import find_detour, find_gait, locomotion_table, read_card
 from vinl.policies.io import find_policy, list_policies, load_policy

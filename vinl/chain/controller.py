@@ -17,7 +17,7 @@ from vinl.policies.card import PolicyCard, find_detour, find_gait, reads_ground
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import DEFAULT_POSE
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, observe
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.floorplan import FloorPlan
 
 ACTION_LIMIT = 100.0

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from vinl.robot.cameras import Camera
 from vinl.robot.rotation import matrix_of
 from vinl.sensing.depth import DepthCamera, Mesh, PreparedRender
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.mesh import floor_mesh, join_meshes, seen_box_mesh
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from vinl.chain.config import EvaluationConfig
 from vinl.robot.aliengo import DEFAULT_POSE
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.clutter import ClutterPreset, scatter_blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.start_goal import StartGoal, sample_start_goals

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from vinl.chain.contacts import KINDS
 from vinl.chain.records import EpisodeRecord
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.endings import FALL, LOOPING, STUCK, TIMEOUT
 from vinl.world.free_space import FreeSpace
 

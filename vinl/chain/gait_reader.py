@@ -22,11 +22,9 @@ from vinl.gait.state import (
     tick,
     velocity_in_heading_frame,
 )
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import flat_field
+from vinl.world.grid import GridFrame, flat_field
 
 RIM = 2.0
 """Level ground around a plan [m]: no robot looks into the map of another episode."""

@@ -10,10 +10,9 @@ from jaxtyping import Float
 from vinl.robot.observation import SCAN_RADIUS
 from vinl.sensing.detour import DetourConfig, bend_command, keep_out
 from vinl.sensing.height_scan import scan_ground
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import BLOCK, WALL, HeightField, flat_field, raise_boxes
+from vinl.world.grid import BLOCK, WALL, GridFrame, HeightField, flat_field, raise_boxes
 
 
 def raise_blocks(bare: HeightField, blocks: Sequence[Blocks]) -> list[HeightField]:

@@ -8,7 +8,7 @@ import numpy as np
 from vinl.robot.aliengo import FOOT_GEOMS, KD, KP
 from vinl.robot.model import robot_spec
 from vinl.world.boxes import Boxes
-from vinl.world.heightfield import HeightField
+from vinl.world.grid import HeightField
 
 WALLS, BLOCKS, GROUND = "walls", "blocks", "ground"
 """Names of the static bodies of walls (with furniture) and blocks, and of the ground's geom."""

@@ -60,8 +60,7 @@ def main(argv: list[str]) -> int:
     options = parse_options(Options, argv, "eval-nav")
     from rich.console import Console
 
-    from vinl.config.output import SCHEMA, check_out, strip_command, write_json, write_text
-    from vinl.config.versions import describe_environment
+    from vinl.config.output import SCHEMA, check_out, describe_environment, strip_command, write_json, write_text
     from vinl.nav.evaluation import END_REASONS, evaluate_kind
     from vinl.nav.evaluation_setup import (
         NavEvaluation,

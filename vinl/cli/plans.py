@@ -94,7 +94,7 @@ def _generate_plans(options: GeneratePlans) -> None:
     from vinl.config.loader import build_config, load_config
     from vinl.world.drawing import save_contact_sheet
     from vinl.world.homes import HomeConfig, generate_home
-    from vinl.world.writer import write_floorplan
+    from vinl.world.readers.own import write_floorplan
 
     if options.count < 1:
         raise InputError(f"--count {options.count}: give a number, 1 or more")
@@ -117,8 +117,7 @@ def _show_plan(options: ShowPlan) -> None:
     import numpy as np
 
     from vinl.world.clutter import choose_clutter, scatter_blocks
-    from vinl.world.free_space import FreeSpace
-    from vinl.world.geodesic import comfortable_path
+    from vinl.world.free_space import FreeSpace, comfortable_path
     from vinl.world.readers import load_floorplan
     from vinl.world.start_goal import sample_start_goals
 

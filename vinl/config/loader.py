@@ -3,16 +3,172 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+import difflib
+import re
+import types
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import dacite
+import yaml
 
 from vinl.config.errors import InputError
-from vinl.config.fields import closest, conform, field_type, inner_dataclass
 from vinl.config.paths import configs_dir
-from vinl.config.yaml_text import parse_override_value, read_yaml
+
+
+class _Loader(yaml.SafeLoader):
+    """Plain data only; YAML 1.2's floats (1e-3 has no dot) and no repeated keys."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if isinstance(key, (list, dict)):
+                raise yaml.constructor.ConstructorError(None, None, "a key must be a word", key_node.start_mark)
+            if key in seen:
+                raise yaml.constructor.ConstructorError(None, None, f"{key!r} stands twice", key_node.start_mark)
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?(?:[0-9][0-9_]*)(?:\.[0-9_]*)?[eE][-+]?[0-9]+$"),
+    list("-+0123456789"),
+)
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """The mapping in a YAML file; an empty file is an empty mapping.
+
+    Raises:
+        InputError: the file cannot be read, is not YAML (with the line), or is not a mapping.
+    """
+    try:
+        data = yaml.load(path.read_text(encoding="utf-8"), _Loader)
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path} is not a text file; expected YAML") from None
+    except yaml.YAMLError as error:
+        raise InputError(f"{path}{_place(error)} is not valid YAML: {_problem(error)}") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} is not valid YAML: {error}") from None
+    if data is None:
+        return {}
+    if not isinstance(data, dict):
+        raise InputError(f"{path} must hold keys and values (key: value), got {type(data).__name__}")
+    return {str(key): value for key, value in data.items()}
+
+
+def parse_override_value(text: str, kind: Any, override: str) -> Any:
+    """The value of ``key=text`` for a field annotated ``kind``.
+
+    Text stays text where the field wants it (``name=3``), a list may come without brackets (``sizes=64,32``).
+    """
+    wants = get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
+    if str in wants and not (type(None) in wants and text.strip() in ("null", "~", "None")):
+        return text
+    origins = {get_origin(w) or w for w in wants}
+    if origins & {tuple, list} and "," in text and not text.lstrip().startswith("["):
+        text = f"[{text}]"
+    if type(None) in wants and text.strip() == "None":
+        return None
+    try:
+        return yaml.load(text, _Loader)
+    except (yaml.YAMLError, ValueError) as error:
+        problem = _problem(error) if isinstance(error, yaml.YAMLError) else str(error)
+        raise InputError(f"override {override!r} has no readable value: {problem}") from None
+
+
+def _place(error: yaml.YAMLError) -> str:
+    mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+    return f", line {mark.line + 1}," if mark else ""
+
+
+def _problem(error: yaml.YAMLError) -> str:
+    text = getattr(error, "problem", None) or str(error)
+    return " ".join(str(text).split())
+
+
+def closest(word: str, known: Iterable[str]) -> str:
+    """``", did you mean 'x'?"``, or nothing if no known word is near."""
+    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    return f", did you mean {near[0]!r}?" if near else ""
+
+
+def inner_dataclass(kind: Any) -> Any | None:
+    """The dataclass of an annotation: itself, or the one in ``X | None``; None if there is none."""
+    if isinstance(kind, type) and dataclasses.is_dataclass(kind):
+        return kind
+    if get_origin(kind) in (Union, types.UnionType):
+        inner = [c for c in get_args(kind) if isinstance(c, type) and dataclasses.is_dataclass(c)]
+        return inner[0] if len(inner) == 1 else None
+    return None
+
+
+def field_type(kind: Any, key: str, prefix: str, source: str) -> Any:
+    """Annotation of ``key`` in the dataclass or mapping type ``kind``; ``prefix`` is the dotted path to it.
+
+    Raises:
+        InputError: there is no such key.
+    """
+    cls = inner_dataclass(kind)
+    if cls is None:
+        if get_origin(kind) in (dict, Mapping):
+            return get_args(kind)[1]
+        if kind in (dict, Any):
+            return Any
+        raise InputError(f"{source}: {prefix} holds a single value, it has no {key!r}")
+    names = [f.name for f in dataclasses.fields(cls) if f.init]
+    if key not in names:
+        where = f"{prefix}.{key}" if prefix else key
+        raise InputError(f"{source}: unknown key {where!r}{closest(key, names)}; known: {', '.join(names)}")
+    return get_type_hints(cls)[key]
+
+
+def conform(kind: Any, value: Any, source: str, prefix: str = "") -> Any:
+    """The value as the annotation wants it where no meaning is lost: lists to tuples, whole numbers to floats.
+
+    Raises:
+        InputError: a key, at any depth, that the dataclass does not have; a truth value where a number belongs.
+    """
+    dotted = f"{prefix}." if prefix else ""
+    if isinstance(value, Mapping):
+        if inner_dataclass(kind) is None and get_origin(kind) not in (dict, Mapping):
+            return value
+        return {
+            key: conform(field_type(kind, str(key), prefix, source), item, source, f"{dotted}{key}")
+            for key, item in value.items()
+        }
+    wants = get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
+    if isinstance(value, bool) and bool not in wants and (int in wants or float in wants):
+        raise InputError(f"{source}: {prefix} must be a number, got {value}")
+    if isinstance(value, int) and float in wants and int not in wants and not isinstance(value, bool):
+        return float(value)
+    if (
+        isinstance(value, str)
+        and any((get_origin(want) or want) in (tuple, list) for want in wants)
+        and str not in wants
+    ):
+        raise InputError(f"{source}: {prefix} must be a list, got {value!r}")
+    if isinstance(value, (list, tuple)):
+        for want in wants:
+            if (get_origin(want) or want) in (tuple, list):
+                return _sequence(want, value, source, prefix)
+    return value
+
+
+def _sequence(kind: Any, values: Sequence[Any], source: str, prefix: str) -> Any:
+    inner = get_args(kind) or (Any,)
+    one_kind = len(inner) == 1 or inner[-1] is Ellipsis
+    kinds = [inner[0]] * len(values) if one_kind else list(inner)
+    if len(kinds) != len(values):
+        raise InputError(f"{source}: {prefix} must have {len(kinds)} values, got {len(values)}")
+    items = [conform(k, v, source, f"{prefix}[{i}]") for i, (k, v) in enumerate(zip(kinds, values, strict=True))]
+    return tuple(items) if (get_origin(kind) or kind) is tuple else items
+
 
 T = TypeVar("T")
 

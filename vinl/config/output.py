@@ -6,8 +6,10 @@ import contextlib
 import json
 import numbers
 import os
+import platform
 import tempfile
 from collections.abc import Iterator, Sequence
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import IO, Any
 
@@ -98,3 +100,26 @@ def write_json(path: Path, data: dict[str, Any]) -> None:
             text = json.dumps(value, indent=2, allow_nan=False).replace("\n", "\n  ")
             body.append(f'  "{key}": {text}')
     write_text(path, "{\n" + ",\n".join(body) + "\n}\n")
+
+
+_PACKAGES = ("vinl", "mujoco", "numpy", "scipy", "scikit-image", "torch", "warp-lang")
+
+
+def describe_environment() -> dict[str, str]:
+    """Versions that figures may depend on."""
+    return {
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        **list_packages(),
+    }
+
+
+def list_packages() -> dict[str, str]:
+    """Versions of the packages that figures may depend on."""
+    found = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found

@@ -11,10 +11,8 @@ from vinl.config.errors import InputError
 from vinl.courses.courses import Start
 from vinl.courses.grounds import Ground
 from vinl.robot.aliengo import DEFAULT_POSE
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import BLOCK, WALL, flat_field, raise_boxes
+from vinl.world.boxes import Blocks, Boxes
+from vinl.world.grid import BLOCK, WALL, GridFrame, flat_field, raise_boxes
 
 WIDTH = 1.0
 """Between the walls of the corridor [m]. The bar spans it."""

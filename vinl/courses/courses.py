@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
+from vinl.config.loader import closest
 from vinl.courses.grounds import Ground
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, home_qpos

@@ -13,11 +13,9 @@ from scipy import ndimage
 from vinl.chain.scene import build_scene
 from vinl.config.errors import InputError
 from vinl.sensing.depth import Mesh
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.clutter import draw_litter
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import BLOCK, HeightField, flat_field, raise_boxes
+from vinl.world.grid import BLOCK, GridFrame, HeightField, flat_field, raise_boxes
 from vinl.world.mesh import box_mesh, floor_mesh, heightfield_mesh, join_meshes
 from vinl.world.terrain import TILE, Terrain, TerrainConfig, build_terrain, draw_blocks, scatter_centres
 

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from vinl.config.output import SCHEMA, round_numbers
-from vinl.config.versions import describe_environment
+from vinl.config.output import SCHEMA, describe_environment, round_numbers
 from vinl.courses.crossing import CrossingRecord
 from vinl.courses.crossing_pictures import draw_feet, film_crossings
 from vinl.courses.evaluate import TrialResults

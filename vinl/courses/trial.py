@@ -21,7 +21,7 @@ from vinl.courses.robot_records import RobotRecord
 from vinl.courses.step_counter import StepCounter
 from vinl.policies.card import find_detour, find_gait, reads_ground
 from vinl.policies.policy import Policy
-from vinl.world.heightfield import WALL
+from vinl.world.grid import WALL
 
 LEAD = 0.5
 """Steps count from so far from the last start on [m]: all feet then come to ground that the robot has seen."""

@@ -9,7 +9,7 @@ from typing import Any
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.controller import ACTION_LIMIT
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
+from vinl.config.loader import closest
 from vinl.export.step import DEPTH, NEXT, Step
 from vinl.policies.card import PolicyCard
 from vinl.policies.depth_policy import DepthPolicy

@@ -15,8 +15,7 @@ from vinl.gait.state import aim, stance_places, start_gait, swings, tick
 from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS
 from vinl.robot.kinematics import HIPS
 from vinl.world.boxes import Boxes
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import BLOCK, flat_field, raise_boxes
+from vinl.world.grid import BLOCK, GridFrame, flat_field, raise_boxes
 
 _SHANK_RADIUS = 0.0145
 _LONGEST = 0.488

@@ -10,8 +10,7 @@ from scipy import ndimage
 
 from vinl.robot.rotation import yaw_of
 from vinl.world.boxes import Boxes
-from vinl.world.clearance import block_distances, clearance
-from vinl.world.grid import GridFrame
+from vinl.world.grid import GridFrame, block_distances, clearance
 
 CREST_RADIUS = 0.10
 """The highest ground within this distance counts for a swing path [m]: as far as a foot rises or falls beside it."""

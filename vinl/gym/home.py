@@ -18,8 +18,7 @@ from vinl.chain.odometry import measure_twist
 from vinl.chain.records import plain_record
 from vinl.chain.workers import one_thread
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
-from vinl.config.loader import load_config
+from vinl.config.loader import closest, load_config
 from vinl.gym.chase import ChaseView
 from vinl.gym.drivers import Guide, Legs
 from vinl.gym.observations import AgentObservation, Cameras, choose_cameras

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.chain.scan_reader import ScanReader
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
+from vinl.config.loader import closest
 from vinl.gym.trip import Trip
 from vinl.policies.card import NAVIGATION_TABLE
 from vinl.robot.cameras import LOCOMOTION_CAMERA, Camera

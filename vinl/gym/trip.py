@@ -16,8 +16,7 @@ from vinl.chain.robot import Robot
 from vinl.chain.scene import build_scene
 from vinl.robot.aliengo import CONTROL_DT, KD, KP
 from vinl.robot.rotation import yaw_of
-from vinl.world.free_space import FreeSpace
-from vinl.world.geodesic import distance_field, read_field
+from vinl.world.free_space import FreeSpace, distance_field, read_field
 
 _WALLS = {k for k, kind in enumerate(KINDS) if kind.endswith("_wall")}
 _FEET = {k for k, kind in enumerate(KINDS) if kind.startswith("foot_")}

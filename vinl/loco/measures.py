@@ -13,7 +13,7 @@ from vinl.loco.config import RewardConfig
 from vinl.loco.rewards import Motion, distance2
 from vinl.loco.simulation import FEET
 from vinl.robot.aliengo import CONTROL_DT, JOINT_SPEED_LIMIT
-from vinl.world.heightfield import BLOCK
+from vinl.world.grid import BLOCK
 from vinl.world.terrain import RESOLUTION, TILE, Terrain
 
 _MEASURE_SIGMA = 0.25

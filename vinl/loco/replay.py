@@ -23,7 +23,7 @@ from vinl.loco.nan_guard import Lost
 from vinl.loco.randomisation import Traits, plain_traits
 from vinl.loco.simulation import Body, DeviceGround, Simulation, target_age, torque_range
 from vinl.robot.aliengo import FOOT_GEOMS, JOINTS, SUBSTEPS
-from vinl.world.heightfield import HeightField
+from vinl.world.grid import HeightField
 from vinl.world.terrain import build_terrain
 
 SIMULATORS = ("mjx", "mujoco")

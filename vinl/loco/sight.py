@@ -15,8 +15,7 @@ from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import Camera
 from vinl.robot.rotation import matrix_of
 from vinl.sensing.depth import DepthCamera, Mesh
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import GROUND
+from vinl.world.grid import GROUND, GridFrame
 from vinl.world.mesh import box_mesh, heightfield_mesh, join_meshes
 from vinl.world.terrain import Terrain
 

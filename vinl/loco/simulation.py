@@ -26,10 +26,8 @@ from vinl.robot.aliengo import (
     TRUNK_SPHERES,
 )
 from vinl.robot.model import robot_spec
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
-from vinl.world.clearance import FAR, block_distances, clearance
-from vinl.world.heightfield import BLOCK, WALL, HeightField
+from vinl.world.boxes import Blocks, Boxes
+from vinl.world.grid import BLOCK, FAR, WALL, HeightField, block_distances, clearance
 
 # TF32 would round a position of 80 m to 6 cm: matrix products in full float32.
 jax.config.update("jax_default_matmul_precision", "highest")

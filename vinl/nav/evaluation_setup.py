@@ -22,7 +22,7 @@ from vinl.policies.io import load_policy
 from vinl.policies.velocity_range import VelocityRange
 from vinl.sensing.odometry_config import OdometryConfig
 from vinl.sensing.sensor_config import load_sensors
-from vinl.world.homes.judging import find_judging_set
+from vinl.world.homes.generate import find_judging_set
 from vinl.world.readers import expand_paths, shipped_floorplans
 
 MOTIONS = {
@@ -178,7 +178,7 @@ def build_homes(
         plans: floor plans, see ``vinl.world.readers.expand_paths``.
         device: for the homes.
         progress: called with homes done and wanted, of each kind anew.
-        sets: names of ``vinl.world.homes.judging.JUDGING_SETS``.
+        sets: names of ``vinl.world.homes.generate.JUDGING_SETS``.
 
     Raises:
         InputError: there are no homes, or none of a kind can be used.

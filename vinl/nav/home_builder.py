@@ -14,8 +14,7 @@ from jaxtyping import Float, Int, UInt8
 from vinl.config.errors import InputError
 from vinl.nav.config import ClutterConfig, NavConfig
 from vinl.nav.fields import measure_near_clearance, spread_fields
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.floorplan import RESOLUTION, FloorPlan
 from vinl.world.grid import GridFrame
 from vinl.world.homes.config import layout_config

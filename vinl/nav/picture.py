@@ -10,8 +10,7 @@ from PIL import Image, ImageDraw
 
 from vinl.nav.home_store import HomeRecord
 from vinl.nav.robot_config import RobotConfig
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 
 HEIGHT = 360
 """Of the picture [pixels]."""

@@ -14,8 +14,7 @@ from vinl.chain.metrics import summarise
 from vinl.render.drawing import draw_histogram, outline_boxes, outline_path
 from vinl.render.page import open_table, render_page
 from vinl.robot.aliengo import LENGTH
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.endings import SUCCESS
 from vinl.world.floorplan import BODY_HEIGHT
 

@@ -29,7 +29,7 @@ from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers, join_peers
 from vinl.rl.peer_loop import PeerLoop, peer_folder
 from vinl.rl.run_folder import RunFolder
-from vinl.world.homes.judging import RESERVED_FROM
+from vinl.world.homes.generate import RESERVED_FROM
 
 _SEEDS_BETWEEN = 10_000_000
 """Each process has homes of its own: their seeds lie this far apart."""

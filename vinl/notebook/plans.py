@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from PIL import Image
 
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.clutter import ClutterPreset, choose_clutter, scatter_blocks
 from vinl.world.drawing import draw_floorplan
 from vinl.world.floorplan import FloorPlan

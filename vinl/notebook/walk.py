@@ -21,14 +21,14 @@ from vinl.chain.records import Episode, EpisodeRecord, EpisodeTrace
 from vinl.chain.rollout import run_episodes
 from vinl.chain.workers import one_thread
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
+from vinl.config.loader import closest
 from vinl.notebook.plans import draw_plan, embed_image, open_plan
 from vinl.policies.policy import Policy
 from vinl.render.panels import colour_depth
 from vinl.render.video import POSE_DT
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.clutter import choose_clutter
 from vinl.world.floorplan import FloorPlan
 from vinl.world.start_goal import StartGoal

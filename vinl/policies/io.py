@@ -12,7 +12,7 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
+from vinl.config.loader import closest
 from vinl.config.paths import assets_dir
 from vinl.gait.observation import SENSED_TABLE
 from vinl.policies.card import (

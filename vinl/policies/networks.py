@@ -13,7 +13,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
+from vinl.config.loader import closest
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE
 
 NETWORKS: dict[str, type[PolicyNetwork]] = {}

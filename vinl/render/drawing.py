@@ -13,8 +13,7 @@ from PIL import Image
 from vinl.chain.contacts import KINDS
 from vinl.chain.records import Episode, EpisodeTrace
 from vinl.robot.aliengo import LENGTH
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 
 CONTACT_CLASS = dict(zip(KINDS, ("fb", "fw", "lb", "lw", "tb", "tw"), strict=True))

@@ -11,8 +11,7 @@ from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from vinl.chain.records import EpisodeRecord
 from vinl.robot.aliengo import LENGTH, WIDTH
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 
 SIZE = (1280, 720)

@@ -9,8 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Int
 
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.mesh import TRIANGLES_PER_BOX, box_mesh, join_meshes
 

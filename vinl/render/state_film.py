@@ -13,8 +13,7 @@ from vinl.render.film_file import write_caption, write_film
 from vinl.render.raytrace import RayRenderer, look_at
 from vinl.render.robot_shape import RobotShape
 from vinl.render.scene import BLOCK, FLOOR, WALL, Scene
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import HeightField
+from vinl.world.grid import GridFrame, HeightField
 from vinl.world.mesh import heightfield_mesh
 
 SIZE = (640, 480)

@@ -23,7 +23,7 @@ from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
 from vinl.robot.rotation import matrix_of, yaw_of
 from vinl.sensing.depth import DepthCamera
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.mesh import floorplan_mesh
 

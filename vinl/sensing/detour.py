@@ -15,8 +15,7 @@ from scipy import ndimage
 
 from vinl.config.errors import InputError
 from vinl.robot.rotation import yaw_of
-from vinl.world.grid import GridFrame
-from vinl.world.heightfield import GROUND, HeightField
+from vinl.world.grid import GROUND, GridFrame, HeightField
 
 STANCE = np.array([[0.24, 0.157], [0.24, -0.157], [-0.24, 0.157], [-0.24, -0.157]])
 """(4, 2) where feet are taken to stand about the middle of the trunk [m]: below the hips, 0.313 m apart [maker's

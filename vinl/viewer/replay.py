@@ -22,7 +22,7 @@ from vinl.viewer.live import CONTACT_MEMORY
 from vinl.viewer.requests import OpenEpisode, Request, Reset, Seek
 from vinl.viewer.snapshot import DepthImage, Snapshot
 from vinl.viewer.world import World
-from vinl.world.blocks import Blocks
+from vinl.world.boxes import Blocks
 from vinl.world.floorplan import FloorPlan
 
 _CONTACT_HEIGHT = 0.06

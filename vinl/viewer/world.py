@@ -10,12 +10,11 @@ from jaxtyping import Float
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_routes, draw_setup
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
+from vinl.config.loader import closest
 from vinl.courses.bars import WIDTH
 from vinl.courses.grounds import DENSITY, GroundConfig, build_ground
 from vinl.robot.aliengo import DEFAULT_POSE, KD, KP, LENGTH
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.clutter import CLUTTER, choose_clutter, scatter_blocks
 from vinl.world.floorplan import FloorPlan
 from vinl.world.grid import GridFrame

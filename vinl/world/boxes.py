@@ -1,4 +1,4 @@
-"""Upright boxes: the one shape that walls, furniture and blocks are made of."""
+"""Upright boxes, the one shape that walls, furniture and blocks are made of; and blocks, the clutter on the floor."""
 
 from __future__ import annotations
 
@@ -84,3 +84,46 @@ class Boxes:
         c, s = np.cos(self.rows[:, 2, None]), np.sin(self.rows[:, 2, None])
         own = np.stack([c * d[..., 0] + s * d[..., 1], -s * d[..., 0] + c * d[..., 1]], -1)
         return np.abs(own) - self.rows[:, None, 3:5] / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Blocks that lie on the floor z = 0.
+
+    Attributes:
+        rows: shape (n, 6), one block a row: x, y of the centre [m], yaw [rad], length [m], width [m], height [m].
+
+    Raises:
+        InputError: if the shape is wrong, a number is not finite, or a size is not positive.
+    """
+
+    rows: Float[np.ndarray, "n 6"]
+    COLUMNS: ClassVar[tuple[str, ...]] = ("x", "y", "yaw", "length", "width", "height")
+
+    def __post_init__(self) -> None:
+        rows = np.asarray(self.rows, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != 6:
+            raise InputError(f"blocks need shape (n, 6), got {rows.shape}")
+        if not np.isfinite(rows).all():
+            raise InputError("blocks hold a number that is not finite")
+        if (rows[:, 3:] <= 0).any():
+            raise InputError("blocks need positive length, width and height")
+        object.__setattr__(self, "rows", rows)
+
+    def __repr__(self) -> str:
+        return f"Blocks({len(self)})"
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @classmethod
+    def empty(cls) -> Blocks:
+        """No blocks at all."""
+        return cls(np.zeros((0, 6)))
+
+    def __add__(self, other: Blocks) -> Blocks:
+        return Blocks(np.concatenate([self.rows, other.rows]))
+
+    def boxes(self) -> Boxes:
+        """The same blocks as boxes that stand on the floor."""
+        return Boxes(np.column_stack([self.rows[:, :5], np.zeros(len(self)), self.rows[:, 5]]))

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
-from vinl.world.blocks import Blocks
+from vinl.config.loader import closest
+from vinl.world.boxes import Blocks
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 
 _BATCH = 1024

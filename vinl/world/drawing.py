@@ -10,8 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.config.errors import InputError
-from vinl.world.blocks import Blocks
-from vinl.world.boxes import Boxes
+from vinl.world.boxes import Blocks, Boxes
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 from vinl.world.start_goal import StartGoal
 

@@ -1,11 +1,16 @@
-"""Where the cells of a grid lie. Rows run along y, columns along x, the origin is the lower left cell."""
+"""Where the cells of a grid lie, height fields with labels, and how far points are from blocks on such a grid.
+Rows run along y, columns along x, the origin is the lower left cell."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
+
+from vinl.config.errors import InputError
+from vinl.world.boxes import Boxes
 
 
 @dataclass(frozen=True)
@@ -47,3 +52,119 @@ class GridFrame:
         rows, columns = self.shape
         rim = cells * self.resolution
         return GridFrame(self.x0 - rim, self.y0 - rim, self.resolution, (rows + 2 * cells, columns + 2 * cells))
+
+
+GROUND, BLOCK, WALL = 0, 1, 2
+"""Labels of the cells, in order of precedence."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeightField:
+    """Heights and labels on one grid.
+
+    Attributes:
+        heights: (rows, columns) height of every vertex [m].
+        labels: (rows, columns) ``GROUND``, ``BLOCK`` or ``WALL``.
+        frame: where the vertices lie.
+
+    Raises:
+        InputError: if the shapes differ or a height is not finite.
+    """
+
+    heights: Float[np.ndarray, "rows columns"]
+    labels: UInt8[np.ndarray, "rows columns"]
+    frame: GridFrame
+
+    def __post_init__(self) -> None:
+        if self.heights.shape != self.frame.shape or self.labels.shape != self.frame.shape:
+            raise InputError(
+                f"height field: shapes of heights {self.heights.shape}, labels {self.labels.shape} and frame "
+                f"{self.frame.shape} differ"
+            )
+        if not np.isfinite(self.heights).all():
+            raise InputError("height field holds a height that is not finite")
+
+
+def flat_field(frame: GridFrame) -> HeightField:
+    """Level ground at z = 0."""
+    return HeightField(np.zeros(frame.shape, np.float32), np.zeros(frame.shape, np.uint8), frame)
+
+
+def raise_boxes(field: HeightField, boxes: Boxes, label: int) -> None:
+    """Write boxes into a height field in place: every vertex inside a footprint rises to the box's top.
+
+    Boxes that stand on another are not told apart: the higher top wins, and so does the higher label.
+
+    Args:
+        field: changed in place.
+        boxes: what to write.
+        label: ``BLOCK`` or ``WALL``.
+    """
+    xs, ys = field.frame.centres()
+    reach = np.hypot(boxes.rows[:, 3], boxes.rows[:, 4]) / 2 + field.frame.resolution
+    for row, r in zip(boxes.rows, reach, strict=True):
+        j = slice(*np.searchsorted(xs, [row[0] - r, row[0] + r]))
+        i = slice(*np.searchsorted(ys, [row[1] - r, row[1] + r]))
+        grid = np.stack(np.meshgrid(xs[j], ys[i]), -1)
+        inside = Boxes(row[None]).contain(grid.reshape(-1, 2)).reshape(grid.shape[:2])
+        heights, labels = field.heights[i, j], field.labels[i, j]
+        heights[inside] = np.maximum(heights[inside], row[6])
+        labels[inside] = np.maximum(labels[inside], label)
+
+
+FAR = 0.25
+"""Distances are held to at most this [m]."""
+
+
+def block_distances(
+    frame: GridFrame, boxes: Boxes
+) -> tuple[Float[np.ndarray, "rows columns"], Float[np.ndarray, "rows columns"]]:
+    """The nearest footprint of every vertex.
+
+    Args:
+        frame: of the grid.
+        boxes: that stand on the floor.
+
+    Returns:
+        Signed distance to the edge of the nearest footprint, negative inside, at most ``FAR`` [m], and its top [m]
+        (0 where none is near).
+    """
+    distance, top = np.full(frame.shape, FAR, np.float32), np.zeros(frame.shape, np.float32)
+    xs, ys = frame.centres()
+    reach = np.hypot(boxes.rows[:, 3], boxes.rows[:, 4]) / 2 + FAR
+    for (x, y, yaw, length, width, _, high), r in zip(boxes.rows, reach, strict=True):
+        j = slice(*np.searchsorted(xs, [x - r, x + r]))
+        i = slice(*np.searchsorted(ys, [y - r, y + r]))
+        gx, gy = np.meshgrid(xs[j] - x, ys[i] - y)
+        u = np.abs(np.cos(yaw) * gx + np.sin(yaw) * gy) - length / 2
+        v = np.abs(-np.sin(yaw) * gx + np.cos(yaw) * gy) - width / 2
+        d = np.hypot(np.maximum(u, 0), np.maximum(v, 0)) + np.minimum(np.maximum(u, v), 0)
+        nearer = d < distance[i, j]
+        distance[i, j] = np.where(nearer, d, distance[i, j])
+        top[i, j] = np.where(nearer, high, top[i, j])
+    return distance, top
+
+
+def clearance(xp: Any, distance: Any, top: Any, frame: GridFrame, points: Any) -> Any:
+    """Distance of points from the nearest block, negative inside it. The same code for numpy and jax.numpy.
+
+    Args:
+        xp: ``numpy`` or ``jax.numpy``.
+        distance, top: (rows * columns,) as ``block_distances`` gives them, flattened.
+        frame: of the grid.
+        points: (..., 3) [m].
+
+    Returns:
+        (...,) distance [m]; exact to about 3 mm along edges and 1 cm at corners, on a grid of 5 cm.
+    """
+    rows, columns = frame.shape
+    c = xp.clip((points[..., 0] - frame.x0) / frame.resolution, 0, columns - 1.001)
+    r = xp.clip((points[..., 1] - frame.y0) / frame.resolution, 0, rows - 1.001)
+    j, i = xp.floor(c), xp.floor(r)
+    a, b = r - i, c - j
+    corner = (i * columns + j).astype("int32")
+    beside = (1 - a) * ((1 - b) * distance[corner] + b * distance[corner + 1])
+    beside = beside + a * ((1 - b) * distance[corner + columns] + b * distance[corner + columns + 1])
+    above = points[..., 2] - top[(xp.round(r) * columns + xp.round(c)).astype("int32")]
+    outside = xp.hypot(xp.maximum(beside, 0), xp.maximum(above, 0))
+    return outside + xp.minimum(xp.maximum(beside, above), 0)

@@ -10,8 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from vinl.config.errors import InputError
 from vinl.world.floorplan import ROOM_TO_STAND, FloorPlan
-from vinl.world.free_space import FIT_RADIUS, FreeSpace
-from vinl.world.geodesic import distance_field, read_field
+from vinl.world.free_space import FIT_RADIUS, FreeSpace, distance_field, read_field
 
 LEAST_PATH = 1.0
 """A plan without two spots this far apart [m] is refused: the robot would arrive where it starts."""

@@ -9,8 +9,7 @@ from jaxtyping import Float
 from scipy.ndimage import minimum_filter1d
 
 from vinl.config.errors import InputError
-from vinl.world.free_space import FIT_RADIUS, FreeSpace
-from vinl.world.geodesic import PATH_SPACING, comfortable_path, path_length
+from vinl.world.free_space import FIT_RADIUS, PATH_SPACING, FreeSpace, comfortable_path, path_length
 
 _ROOM = 0.7
 """Clearance that the planned path seeks [m]: the robot's length. It comes to doors head on."""

@@ -1,20 +1,150 @@
-"""A home from a number."""
+"""A home from a number: drawn, furnished, its rooms connected; and the sets of homes that are kept for judging."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from random import Random
 
 import numpy as np
+from jaxtyping import Bool
+from scipy.ndimage import distance_transform_edt
 
 from vinl.config.errors import InputError
+from vinl.config.loader import closest
 from vinl.world.boxes import Boxes
-from vinl.world.floorplan import RESOLUTION, FloorPlan, RoomLabel, assemble_floorplan, frame_around
-from vinl.world.homes.config import HomeConfig
-from vinl.world.homes.furnish import furnish
-from vinl.world.homes.offices import draw_office
-from vinl.world.homes.reach import CHECKED_AT, keep_connected, paint_rects
-from vinl.world.homes.rooms import Room, draw_rooms, measure
+from vinl.world.floorplan import (
+    BODY_HEIGHT,
+    RESOLUTION,
+    FloorPlan,
+    RoomLabel,
+    assemble_floorplan,
+    frame_around,
+    measure_clearance,
+)
+from vinl.world.grid import GridFrame
+from vinl.world.homes.config import HomeConfig, layout_config
+from vinl.world.homes.furnish import Piece, furnish
+from vinl.world.homes.rooms import Rect, Room, draw_office, draw_rooms, measure
 from vinl.world.homes.walls import Shell, raise_shell
+from vinl.world.raster import find_cells, label_regions, paint_boxes
+
+CHECKED_AT = 0.1
+"""Side of the cells that paths are checked on [m]. A path that is wide enough on these is wide enough on finer ones."""
+
+CHECKED_RADIUS = 0.349
+"""Radius that paths are checked for on the coarse cells [m]. Straight gaps of seven cells pass, so every door does;
+between corners, of which the cells may miss the tips, it leaves room for ``free_space.FIT_RADIUS``."""
+
+POCKET = 0.25
+"""Floor cut off from the rest that is let be [m2]: the spot behind an open bedside."""
+
+BETWEEN = 0.6
+"""A piece with cells nearer than this to two regions lies between them [m]."""
+
+ROUNDS = 12
+"""Pieces are taken away so many times at most; then the home is left bare."""
+
+
+def keep_connected(
+    rooms: list[Room], walls: Boxes, pieces: list[Piece], inside: Bool[np.ndarray, "rows columns"], frame: GridFrame
+) -> list[Piece] | None:
+    """The pieces that may stay, so that a robot of ``FIT_RADIUS`` reaches every room, and all floor but pockets.
+
+    Args:
+        rooms: of the home.
+        walls: lintels included.
+        pieces: all furniture.
+        inside: floor of the home on the frame.
+        frame: of ``CHECKED_AT``.
+
+    Returns:
+        ``None`` if the rooms are not connected even without furniture.
+    """
+    floor = inside & ~paint_boxes(walls.below(BODY_HEIGHT), frame)
+    cells = _find_low(pieces, frame)
+    windows = [_window(rect, frame) for room in rooms for rect in room.rects]
+    owners = [k for k, room in enumerate(rooms) for _ in room.rects]
+    kept = set(range(len(pieces)))
+    for attempt in range(ROUNDS + 1):
+        free = floor.copy()
+        for k in kept:
+            free.flat[cells[k]] = False
+        fits = measure_clearance(free, frame.resolution) >= CHECKED_RADIUS
+        regions = label_regions(fits)
+        if not regions.any():
+            return None
+        sizes = np.bincount(regions.ravel())
+        sizes[0] = 0
+        main = int(sizes.argmax())
+        reached = {owner for owner, where in zip(owners, windows, strict=True) if (regions[where] == main).any()}
+        lost = set(range(len(rooms))) - reached
+        bad = {int(k) for k in np.flatnonzero(sizes * frame.resolution**2 >= POCKET)} - {main}
+        gone: set[int] = set()
+        for room in lost:
+            inner = [k for k in kept if pieces[k].room == room]
+            parts = [regions[where] for owner, where in zip(owners, windows, strict=True) if owner == room]
+            islands = {int(k) for part in parts for k in np.unique(part[part > 0])}
+            bad |= islands
+            if attempt >= ROUNDS // 2 or not islands:
+                gone |= set(inner) if attempt >= ROUNDS // 2 else set(inner[-1:])
+        if bad:
+            gone |= _blame(regions, main, bad, cells, kept, pieces)
+        if not gone:
+            return None if lost else [pieces[k] for k in sorted(kept)]
+        kept -= gone
+    return [] if _joined(floor, frame, windows, owners) else None
+
+
+def paint_rects(rects: list[Rect], frame: GridFrame) -> Bool[np.ndarray, "rows columns"]:
+    """The cells whose centre lies in one of the rectangles."""
+    grid = np.zeros(frame.shape, dtype=bool)
+    for rect in rects:
+        grid[_window(rect, frame)] = True
+    return grid
+
+
+def _window(rect: Rect, frame: GridFrame) -> tuple[slice, slice]:
+    """The cells whose centre lies in a rectangle."""
+    x0, y0, x1, y1 = rect
+    low = np.ceil((np.array([y0, x0]) - [frame.y0, frame.x0]) / frame.resolution - 1e-9).astype(int)
+    high = np.floor((np.array([y1, x1]) - [frame.y0, frame.x0]) / frame.resolution + 1e-9).astype(int) + 1
+    return slice(max(low[0], 0), max(high[0], 0)), slice(max(low[1], 0), max(high[1], 0))
+
+
+def _find_low(pieces: list[Piece], frame: GridFrame) -> list[np.ndarray]:
+    """For each piece the numbers of the cells under those of its parts that take floor from the robot."""
+    rows = [(k, row) for k, piece in enumerate(pieces) for row in piece.rows if row[5] < BODY_HEIGHT]
+    numbers = np.arange(frame.shape[0] * frame.shape[1]).reshape(frame.shape)
+    parts: list[list[np.ndarray]] = [[np.zeros(0, int)] for _ in pieces]
+    boxes = Boxes(np.array([row for _, row in rows]).reshape(-1, 7))
+    for (k, _), (where, along, held) in zip(rows, find_cells(boxes, frame), strict=True):
+        under = numbers[where, along]
+        parts[k].append(under.ravel() if held is True else under[held])
+    return [np.concatenate(part) for part in parts]
+
+
+def _blame(regions: np.ndarray, main: int, bad: set[int], cells: list, kept: set[int], pieces: list[Piece]) -> set[int]:
+    """For each region that is cut off, the piece to take away: one that lies between it and others."""
+    steps, (rows, columns) = distance_transform_edt(regions == 0, return_indices=True)  # type: ignore[misc]
+    nearest = np.where(steps < BETWEEN / CHECKED_AT, regions[rows, columns], 0)
+    beside = {k: set(nearest.flat[cells[k]].tolist()) - {0} for k in kept}
+    gone: set[int] = set()
+    for region in bad:
+        near = [k for k in kept if region in beside[k]]
+        between = [k for k in near if main in beside[k]] or [k for k in near if len(beside[k]) > 1] or near
+        if between and not gone & set(between):
+            # chairs go before tables, small things before large ones
+            gone.add(min(between, key=lambda k: (pieces[k].chief, len(cells[k]), k)))
+    return gone
+
+
+def _joined(floor: np.ndarray, frame: GridFrame, windows: list[tuple[slice, slice]], owners: list[int]) -> bool:
+    regions = label_regions(measure_clearance(floor, frame.resolution) >= CHECKED_RADIUS)
+    if not regions.any():
+        return False
+    main = int(np.bincount(regions.ravel())[1:].argmax()) + 1
+    return {o for o, where in zip(owners, windows, strict=True) if (regions[where] == main).any()} == set(owners)
+
 
 ATTEMPTS = 100
 """Layouts drawn for a home before the ranges are taken for impossible; one to three are the rule."""
@@ -89,3 +219,47 @@ def _draw_shell(rng: Random, config: HomeConfig) -> Shell:
 def _label(room: Room) -> RoomLabel:
     x0, y0, x1, y1 = max(room.rects, key=measure)
     return RoomLabel(room.kind, (x0 + x1) / 2, (y0 + y1) / 2)
+
+
+RESERVED_FROM = 1_000_000_000
+"""Seeds from here on are for judging; trainings keep below."""
+
+
+@dataclass(frozen=True)
+class JudgingSet:
+    """Floors of one layout from a row of seeds.
+
+    Attributes:
+        layout: one of ``vinl.world.homes.config.LAYOUTS``, as ``layout_config`` has it.
+        first_seed: of the first floor.
+        count: floors.
+    """
+
+    layout: str
+    first_seed: int
+    count: int = 20
+
+    def generate(self) -> list[FloorPlan]:
+        """The floors, the same on every machine."""
+        config = layout_config(self.layout)
+        return [generate_home(seed, config) for seed in range(self.first_seed, self.first_seed + self.count)]
+
+
+JUDGING_SETS = {
+    "offices": JudgingSet("office", 2_000_000_000),
+    "dead_ends": JudgingSet("dead_ends", 2_100_000_000),
+}
+"""20 office floors, and 20 homes whose rooms and doors make a tree."""
+
+
+def find_judging_set(name: str) -> JudgingSet:
+    """The set of a name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if name not in JUDGING_SETS:
+        raise InputError(
+            f"unknown set of homes {name!r}{closest(name, JUDGING_SETS)}; known: {', '.join(JUDGING_SETS)}"
+        )
+    return JUDGING_SETS[name]

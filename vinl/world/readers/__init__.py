@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from vinl.config.errors import InputError
-from vinl.config.fields import closest
+from vinl.config.loader import closest
 from vinl.config.paths import assets_dir
 from vinl.world.floorplan import FloorPlan
-from vinl.world.readers.image import read_image_plan
+from vinl.world.readers.image import read_image_plan, read_ros_map
 from vinl.world.readers.json_plan import expand_paths, read_json_plan
-from vinl.world.readers.ros_map import read_ros_map
 
 IMAGES = (".png", ".pgm")
 ROS_MAPS = (".yaml", ".yml")

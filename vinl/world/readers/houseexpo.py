@@ -11,8 +11,7 @@ from jaxtyping import Float
 from vinl.config.errors import InputError
 from vinl.world.boxes import FARTHEST, Boxes
 from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan, frame_around
-from vinl.world.readers.polygons import paint_polygon
-from vinl.world.readers.segments import box_along
+from vinl.world.readers.segments import box_along, paint_polygon
 
 WALL_THICKNESS = 0.08
 """Walls stand on the outline, this thick [m]. Between rooms the outline runs along both faces of the real wall."""

@@ -11,8 +11,7 @@ import numpy as np
 from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan
-from vinl.world.readers.polygons import paint_inside, place_label
-from vinl.world.readers.segments import Opening, Wall, raise_walls
+from vinl.world.readers.segments import Opening, Wall, paint_inside, place_label, raise_walls
 
 WALL_THICKNESS = 0.1
 """ProcTHOR's walls are planes; here they are this thick [m]."""
