@@ -2,9 +2,8 @@
 
 import pytest
 
-from vinl.nav.config import HomesConfig, NavConfig
+from vinl.nav.config import HomesConfig, NavCameraConfig, NavConfig
 from vinl.nav.home_store import HomeStore
-from vinl.nav.robot_config import NavCameraConfig
 from vinl.world.readers import load_floorplan
 
 

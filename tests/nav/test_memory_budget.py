@@ -7,8 +7,8 @@ import pytest
 
 from vinl.cli.app import main
 from vinl.config.loader import build_config
+from vinl.nav.benchmark import predict_memory
 from vinl.nav.config import NavConfig
-from vinl.nav.memory_budget import predict_memory
 
 SMALL = {
     "num_envs": 8,

@@ -8,8 +8,8 @@ import pytest
 import shapely
 import torch
 
+from vinl.nav.config import ExecutionConfig
 from vinl.nav.environment import NavEnvironment
-from vinl.nav.robot_config import ExecutionConfig
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import BODY_HEIGHT
 

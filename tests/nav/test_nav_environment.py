@@ -6,9 +6,8 @@ import pytest
 import torch
 
 from vinl.config.errors import InputError
-from vinl.nav.config import EpisodeConfig
+from vinl.nav.config import EpisodeConfig, NavPpoConfig
 from vinl.nav.environment import NavEnvironment
-from vinl.nav.ppo_config import NavPpoConfig
 from vinl.policies.places import VIEW
 from vinl.policies.velocity_range import VelocityRange
 
@@ -110,7 +109,7 @@ def test_a_cancelled_step_is_seen_unless_the_paper_asks(config, homes, previous)
 def test_the_motion_seen_is_what_the_poses_say(config, homes, lowest):
     """The chain measures the same from the poses of the robot's trunk (``vinl.chain.odometry``)."""
     from vinl.chain.odometry import measure_twist
-    from vinl.nav.robot_config import ExecutionConfig
+    from vinl.nav.config import ExecutionConfig
 
     execution = ExecutionConfig(lag=0.1, speed_gain=(0.8, 1.0), yaw_noise=0.2, speed_noise=0.1, side_slip=0.1)
     robot = replace(config.robot, min_speed=lowest)

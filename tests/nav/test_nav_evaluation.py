@@ -18,12 +18,20 @@ from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.config.paths import assets_dir
 from vinl.nav.config import NavConfig
-from vinl.nav.evaluation import END_REASONS, NavRecord, evaluate_kind
-from vinl.nav.evaluation_setup import NavEvaluation, build_homes, describe_episodes, load_navigator, name_kind
+from vinl.nav.evaluation import (
+    END_REASONS,
+    NavEvaluation,
+    NavRecord,
+    build_homes,
+    describe_episodes,
+    evaluate_kind,
+    load_navigator,
+    name_kind,
+)
 from vinl.nav.home_store import HomeStore
+from vinl.nav.recurrent_model import build_actor
 from vinl.nav.report import aggregate_by_distance, choose_drawn, count_failures, print_failures
 from vinl.nav.training import check_seeds, make_card
-from vinl.nav.warm_start import build_actor
 from vinl.policies.io import save_policy
 from vinl.world.free_space import FreeSpace
 from vinl.world.readers import expand_paths, load_floorplan

@@ -14,11 +14,10 @@ import torch
 from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
-from vinl.nav.config import NavConfig
-from vinl.nav.ppo_config import NavPpoConfig
+from vinl.nav.config import NavConfig, NavPpoConfig
+from vinl.nav.recurrent_model import build_actor, load_critic, load_start, save_critic
 from vinl.nav.recurrent_ppo import count_guesses
 from vinl.nav.training import build_algorithm, make_card, separate
-from vinl.nav.warm_start import build_actor, load_critic, load_start, save_critic
 from vinl.policies.io import load_policy, save_policy
 from vinl.policies.nav_actor import NavActor
 

@@ -11,10 +11,9 @@ from tensordict import TensorDict
 from torch import nn
 
 from vinl.config.errors import InputError
-from vinl.nav.ppo_config import NavPpoConfig
-from vinl.nav.recurrent_model import RecurrentActorCritic
+from vinl.nav.config import NavPpoConfig
+from vinl.nav.recurrent_model import RecurrentActorCritic, RecurrentStorage
 from vinl.nav.recurrent_ppo import RecurrentPPO
-from vinl.nav.recurrent_storage import RecurrentStorage
 from vinl.policies.depth_memory import DepthMemory
 from vinl.policies.networks import NETWORKS, PolicyNetwork
 from vinl.rl.learning_rate import DeviceRate

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 import torch
 
-from vinl.nav.config import EpisodeConfig, NavRewardConfig
+from vinl.nav.config import EpisodeConfig, ExecutionConfig, MotionConfig, NavCameraConfig, NavRewardConfig, ViewConfig
 from vinl.nav.environment import NavEnvironment
-from vinl.nav.robot_config import ExecutionConfig, MotionConfig, NavCameraConfig, ViewConfig
 from vinl.sensing.depth import DepthCamera
 from vinl.sensing.odometry_config import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig

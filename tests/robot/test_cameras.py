@@ -9,8 +9,7 @@ import vinl
 from vinl.config.errors import InputError
 from vinl.config.loader import load_config
 from vinl.loco.config import LocoConfig
-from vinl.nav.config import NavConfig
-from vinl.nav.robot_config import NavCameraConfig
+from vinl.nav.config import NavCameraConfig, NavConfig
 from vinl.policies.io import list_policies
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
 

@@ -148,8 +148,8 @@ def _bench_nav(options: NavOptions) -> dict[str, Any]:
 
 def _predict_memory(options: MemoryOptions) -> dict[str, Any]:
     from vinl.config.loader import load_config
+    from vinl.nav.benchmark import predict_memory
     from vinl.nav.config import NavConfig
-    from vinl.nav.memory_budget import predict_memory
 
     figures = predict_memory(load_config(NavConfig, options.config, options.overrides))
     return {f"{name}_gb": round(value, 2) for name, value in figures.items()}

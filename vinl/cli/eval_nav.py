@@ -61,12 +61,13 @@ def main(argv: list[str]) -> int:
     from rich.console import Console
 
     from vinl.config.output import SCHEMA, check_out, describe_environment, strip_command, write_json, write_text
-    from vinl.nav.evaluation import END_REASONS, evaluate_kind
-    from vinl.nav.evaluation_setup import (
+    from vinl.nav.evaluation import (
+        END_REASONS,
         NavEvaluation,
         build_homes,
         describe_episodes,
         describe_policy,
+        evaluate_kind,
         load_navigator,
     )
     from vinl.nav.measures import STUCK_STEPS

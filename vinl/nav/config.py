@@ -3,16 +3,322 @@ values live in ``configs/nav/*.yaml``."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from vinl.config.errors import InputError
 from vinl.config.limits import Range, check_fields, check_number, check_range
-from vinl.nav.ppo_config import NavNetworkConfig, NavPpoConfig
-from vinl.nav.robot_config import ExecutionConfig, MotionConfig, NavCameraConfig, RobotConfig, ViewConfig
 from vinl.policies.card import PREVIOUS
+from vinl.robot.cameras import NAVIGATION_CAMERA, Camera
 from vinl.sensing.odometry_config import OdometryConfig
 from vinl.sensing.sensor_config import SensorConfig
 from vinl.world.homes.config import HomeConfig, layout_config
+
+Pair = tuple[float, float]
+"""Of roll and of pitch."""
+
+
+@dataclass(frozen=True)
+class RobotConfig:
+    """What moves.
+
+    Attributes:
+        length, width: of the rectangle that must not touch anything [m] [facts: 0.65 x 0.31].
+        min_speed: forward speed of action -1 [m/s]; 0: there is no way back; negative: it walks backwards, unseen.
+        max_speed: forward speed of action 1 [m/s].
+        max_yaw_rate: yaw rate of action 1 [rad/s].
+        period: an action holds so long [s].
+    """
+
+    length: float = 0.65
+    width: float = 0.31
+    min_speed: float = 0.0
+    max_speed: float = 1.0
+    max_yaw_rate: float = math.pi / 3
+    period: float = 0.5
+
+    def __post_init__(self) -> None:
+        for name in ("length", "width", "max_speed", "max_yaw_rate", "period"):
+            check_number(f"robot.{name}", getattr(self, name), 1e-3, 10.0)
+        check_number("robot.min_speed", self.min_speed, -10.0, 0.0)
+        if self.width > self.length:
+            raise InputError("robot.width must not exceed robot.length")
+
+
+@dataclass(frozen=True)
+class NavCameraConfig:
+    """The depth camera in its resting pose.
+
+    Attributes:
+        pitch_down: optical axis below the horizontal [rad]; negative looks up.
+        hfov: horizontal field of view [rad].
+        width, height: image size [pixels].
+        far: farther, or nothing hit, reads as this, which is 1 in the normalised image [m].
+        forward: the camera is so far ahead of the robot's middle [m].
+        mount_height: of the camera above the floor when the robot stands [m].
+        missing: what becomes of pixels without a return before the network: ``fill``, ``plane`` or ``as_is``, see
+            ``vinl.robot.cameras.MISSING``.
+    """
+
+    pitch_down: float = NAVIGATION_CAMERA.pitch_down
+    hfov: float = NAVIGATION_CAMERA.hfov
+    width: int = NAVIGATION_CAMERA.width
+    height: int = NAVIGATION_CAMERA.height
+    far: float = NAVIGATION_CAMERA.far
+    forward: float = NAVIGATION_CAMERA.position[0]
+    mount_height: float = 0.36
+    missing: str = NAVIGATION_CAMERA.missing
+
+    def __post_init__(self) -> None:
+        self.record()
+        check_number("camera.pitch_down", self.pitch_down, -1.5, 1.5)
+        check_number("camera.forward", self.forward, -1.0, 1.0)
+        check_number("camera.mount_height", self.mount_height, 0.05, 2.0)
+
+    def record(self) -> Camera:
+        """The camera fixed to the trunk, as policy cards keep it."""
+        return Camera(
+            "navigation",
+            (self.forward, 0.0, 0.0),
+            self.pitch_down,
+            self.hfov,
+            self.width,
+            self.height,
+            self.far,
+            self.missing,
+        )
+
+
+@dataclass(frozen=True)
+class MotionConfig:
+    """How the camera moves against its resting pose; pairs are roll (right side down is positive) and pitch (nose down
+    is positive).
+
+    Attributes:
+        tilt: mean roll and pitch of the walking trunk [rad].
+        offset: what an episode adds to them, uniform within +- this [rad].
+        shake: standard deviation of the motion within an episode, normal [rad].
+        correlation: of the motion within an episode (height too) from one step of 0.5 s to the next; 0: each step is
+            drawn anew.
+        amplitude: range of a factor of an episode on ``shake`` and ``height_shake``, uniform; 0 is a steady trunk.
+        uniform: roll and pitch drawn anew each step, each uniform within +- this [rad] [paper: 30 deg].
+        height_offset: height of an episode, uniform within +- this [m].
+        height_shake: standard deviation of the height within an episode [m].
+        with_trunk: roll and pitch turn the trunk, so that the camera ahead of it goes up and down; otherwise the camera
+            turns about itself [paper].
+    """
+
+    tilt: Pair = (0.0, 0.0)
+    offset: Pair = (0.0, 0.0)
+    shake: Pair = (0.0, 0.0)
+    correlation: float = 0.0
+    amplitude: Range = (1.0, 1.0)
+    uniform: float = 0.0
+    height_offset: float = 0.0
+    height_shake: float = 0.0
+    with_trunk: bool = True
+
+    def __post_init__(self) -> None:
+        for k, axis in enumerate(("roll", "pitch")):
+            check_number(f"motion.tilt ({axis})", self.tilt[k], -1.0, 1.0)
+            check_number(f"motion.offset ({axis})", self.offset[k], 0.0, 1.0)
+            check_number(f"motion.shake ({axis})", self.shake[k], 0.0, 1.0)
+        check_number("motion.uniform", self.uniform, 0.0, 1.0)
+        check_number("motion.correlation", self.correlation, 0.0, 0.999)
+        check_range("motion.amplitude", self.amplitude, 0.0, 10.0)
+        for name in ("height_offset", "height_shake"):
+            check_number(f"motion.{name}", getattr(self, name), 0.0, 0.2)
+
+
+@dataclass(frozen=True)
+class ViewConfig:
+    """What else differs in the images.
+
+    Attributes:
+        ceiling_share: fraction of the episodes with a ceiling.
+        ceiling: range of its height [m].
+    """
+
+    ceiling_share: float = 0.6
+    ceiling: Range = (2.4, 3.4)
+
+    def __post_init__(self) -> None:
+        check_number("view.ceiling_share", self.ceiling_share, 0.0, 1.0)
+        check_range("view.ceiling", self.ceiling, 1.0, 20.0)
+
+
+@dataclass(frozen=True)
+class ExecutionConfig:
+    """How the robot carries out a velocity; the defaults are perfect [paper].
+
+    Attributes:
+        lag: the velocity approaches the commanded one with this time constant [s].
+        speed_gain, yaw_gain: ranges of a factor of an episode on forward speed and yaw rate.
+        speed_noise, yaw_noise: standard deviation of a step's mean forward speed [m/s] and yaw rate [rad/s], for a
+            robot at full speed; less in proportion when slower or turning less (half of it when it stands).
+        side_slip: standard deviation of a step's mean sideways speed [m/s], in proportion to the forward speed.
+        yaw_drift: yaw rate of an episode when walking at full speed, uniform within +- this [rad/s].
+        amplitude: range of a factor of an episode on the noises and the slip, uniform; 0 is sure of foot.
+        give_way: a step that would touch something is not cancelled as a whole: the robot turns on the spot, and
+            what its corners meet pushes it so far back or aside at most [m]; 0: cancelled as a whole [paper].
+    """
+
+    lag: float = 0.0
+    speed_gain: Range = (1.0, 1.0)
+    yaw_gain: Range = (1.0, 1.0)
+    speed_noise: float = 0.0
+    yaw_noise: float = 0.0
+    side_slip: float = 0.0
+    yaw_drift: float = 0.0
+    amplitude: Range = (1.0, 1.0)
+    give_way: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_number("execution.lag", self.lag, 0.0, 5.0)
+        check_range("execution.speed_gain", self.speed_gain, 0.0, 2.0)
+        check_range("execution.yaw_gain", self.yaw_gain, 0.0, 2.0)
+        for name in ("speed_noise", "yaw_noise", "side_slip", "yaw_drift"):
+            check_number(f"execution.{name}", getattr(self, name), 0.0, 1.0)
+        check_range("execution.amplitude", self.amplitude, 0.0, 10.0)
+        check_number("execution.give_way", self.give_way, 0.0, 0.5)
+
+
+VISIONS, MEMORIES = ("resnet18", "cnn"), ("lstm", "mlp")
+IMAGE_TYPES = ("float16", "uint8")
+"""How a roll-out keeps images: half precision, or bytes of 1/255 of the range."""
+
+
+@dataclass(frozen=True)
+class NavNetworkConfig:
+    """Sizes of the navigator [ViNL resnet_policy.py]. A config without camera gets no image part.
+
+    Attributes:
+        vision: ``resnet18`` or ``cnn`` (three convolutions).
+        planes: channels of the ResNet's first stage.
+        visual: numbers that the image becomes.
+        embedding: numbers that goal and previous action become, each.
+        hidden, layers: width and layers of the memory.
+        memory: ``lstm``, or ``mlp``, which remembers nothing.
+        places: the network keeps a map of its own of where it has been and what its camera saw to be solid, and sees
+            the 4 m around it (``vinl.policies.own_map``); needs ``previous`` motion or both.
+    """
+
+    vision: str = "resnet18"
+    planes: int = 32
+    visual: int = 512
+    embedding: int = 32
+    hidden: int = 512
+    layers: int = 2
+    memory: str = "lstm"
+    places: bool = False
+
+    def __post_init__(self) -> None:
+        if self.vision not in VISIONS:
+            raise InputError(f"network.vision must be one of {', '.join(VISIONS)}, got {self.vision!r}")
+        if self.memory not in MEMORIES:
+            raise InputError(f"network.memory must be one of {', '.join(MEMORIES)}, got {self.memory!r}")
+        check_fields(self, "network.", counts=("planes", "visual", "embedding", "hidden", "layers"))
+        if self.planes % 16 and self.vision == "resnet18":
+            raise InputError(f"network.planes must be a multiple of 16 (groups of the norms), got {self.planes}")
+
+
+@dataclass(frozen=True)
+class NavPpoConfig:
+    """Proximal policy optimisation over whole sequences.
+
+    Attributes:
+        steps: steps of each robot between updates; also how far back errors go through the memory.
+        epochs, minibatches: passes over the roll-out and parts (of robots) of each.
+        learning_rate: at the start; it then follows ``desired_kl`` within ``min_rate`` and ``max_rate``.
+        desired_kl: divergence of an update that the rate is steered to.
+        min_rate, max_rate: limits of the rate; without a floor the divergence of ever surer actions brings
+            it, and learning with it, to a halt.
+        cool_from: from this fraction of the iterations on the limits fall, linearly, towards ``last_rate``; 1: never.
+        last_rate: learning rate at the end, see ``cool_from``.
+        gamma, lam: discount and GAE factor.
+        clip: of the probability ratio and of the value.
+        value: weight of the value loss.
+        entropy, last_entropy: weight of the entropy bonus at the start and, moving from ``cool_from`` on, at the end;
+            null: it stays.
+        places: weight of a further loss: a linear layer on the memory's output is to tell where in the 4 m around it
+            the robot has been lately (``vinl.policies.places``), so that the memory learns to keep places and to know
+            them again. Motion and images hold all that it takes. 0: none.
+        max_grad_norm: gradients are clipped to this norm.
+        log_std, log_std_range: logarithm of the actions' standard deviation at the start, and its limits.
+        last_log_std: from ``cool_from`` on the upper limit moves to this: what is shipped acts without chance, and
+            only training almost without chance shows it where it would get stuck; null: the limit stays.
+        critic_warmup: in so many first updates only the critic's own layer learns: one that starts afresh beside the
+            weights of a policy (``--from``) would otherwise teach them nonsense.
+        image_type: how the roll-out keeps images: ``float16``, or ``uint8`` in half the memory.
+        bf16: images in bfloat16 (GPU only).
+        compiled: image network through ``torch.compile`` (GPU only): a minute at the start, then faster.
+        keep_at: the policy is also kept aside once after so many samples.
+    """
+
+    steps: int = 24
+    epochs: int = 2
+    minibatches: int = 4
+    learning_rate: float = 5e-4
+    desired_kl: float = 0.01
+    min_rate: float = 2e-4
+    max_rate: float = 1.5e-3
+    cool_from: float = 0.7
+    last_rate: float = 5e-5
+    gamma: float = 0.99
+    lam: float = 0.95
+    clip: float = 0.2
+    value: float = 0.5
+    entropy: float = 0.003
+    last_entropy: float | None = None
+    places: float = 0.0
+    max_grad_norm: float = 0.5
+    log_std: float = -0.5
+    log_std_range: tuple[float, float] = (-2.0, 0.2)
+    last_log_std: float | None = None
+    critic_warmup: int = 0
+    image_type: str = "float16"
+    bf16: bool = True
+    compiled: bool = True
+    keep_at: tuple[float, ...] = (2.5e6, 1e7, 2e7, 5e7, 1e8, 2e8, 5e8)
+
+    def __post_init__(self) -> None:
+        check_fields(
+            self,
+            "ppo.",
+            counts=("steps", "epochs", "minibatches"),
+            positive=("desired_kl", "last_rate", "clip", "max_grad_norm", "gamma"),
+            unsigned=("value", "entropy", "last_entropy", "places", "critic_warmup"),
+            fractions=("gamma", "lam", "cool_from"),
+        )
+        if self.image_type not in IMAGE_TYPES:
+            raise InputError(f"ppo.image_type must be one of {', '.join(IMAGE_TYPES)}, got {self.image_type!r}")
+        if not 0 < self.min_rate <= self.learning_rate <= self.max_rate:
+            raise InputError("ppo: need 0 < min_rate <= learning_rate <= max_rate")
+        low, high = self.log_std_range
+        if not low <= self.log_std <= high or not math.isfinite(low + high):
+            raise InputError(f"ppo.log_std must lie within log_std_range {low:g} to {high:g}, got {self.log_std:g}")
+        if self.last_log_std is not None and not low <= self.last_log_std <= high:
+            raise InputError(f"ppo.last_log_std must lie within log_std_range, got {self.last_log_std:g}")
+
+    def rate_limits(self, fraction: float) -> tuple[float, float]:
+        """Lowest and highest learning rate after a fraction of the iterations."""
+        cooled, low = self._cooled(fraction), self.min_rate
+        low += cooled * (min(self.last_rate, low) - low)
+        return low, max(low, self.max_rate + cooled * (self.last_rate - self.max_rate))
+
+    def entropy_at(self, fraction: float) -> float:
+        """Weight of the entropy bonus after a fraction of the iterations."""
+        last = self.entropy if self.last_entropy is None else self.last_entropy
+        return self.entropy + self._cooled(fraction) * (last - self.entropy)
+
+    def spread_at(self, fraction: float) -> tuple[float, float]:
+        """Limits of the logarithm of the actions' standard deviation after a fraction of the iterations."""
+        low, high = self.log_std_range
+        last = high if self.last_log_std is None else self.last_log_std
+        return low, high + self._cooled(fraction) * (last - high)
+
+    def _cooled(self, fraction: float) -> float:
+        return min(max((fraction - self.cool_from) / (1.0 - self.cool_from), 0.0), 1.0) if self.cool_from < 1 else 0.0
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,17 @@ from torch import Tensor
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
 from vinl.nav.home_store import HomeStore
+from vinl.nav.kernels import (
+    Robots,
+    aim_cameras,
+    draw_keys,
+    measure_robots,
+    move_robots,
+    place_robots,
+    render_interior,
+    write_rules,
+)
 from vinl.nav.measures import EpisodeEnd, Measures, end_episodes
-from vinl.nav.motion_kernels import measure_robots, move_robots, place_robots
-from vinl.nav.structs import Robots, write_rules
-from vinl.nav.view_kernels import aim_cameras, draw_keys, render_interior
 from vinl.policies.places import blank_places, view_places, visit_places
 from vinl.robot.cameras import Camera
 from vinl.sensing.depth import check_device
@@ -73,7 +80,7 @@ class NavEnvironment:
         num_envs: robots.
         camera: its record, or None if the robots are blind.
         ended: figures of the episodes that ended in the last step, see ``EpisodeEnd``; None before the first.
-        state: the robots' tensors by name, see ``structs.Robots``; to be read.
+        state: the robots' tensors by name, see ``kernels.Robots``; to be read.
 
     Raises:
         InputError: the device is not there, or not the homes'.

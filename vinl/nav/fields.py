@@ -1,15 +1,21 @@
 """Distance fields to many goals at once, and clearance, by compiled code on the CPU: fast enough to build homes while
 training runs."""
 
-from __future__ import annotations
+# ruff: noqa: UP018, RUF046 - a variable of a kernel that changes must be made by its type
+# pyright: reportInvalidTypeForm=false, reportCallIssue=false, reportArgumentType=false
+# pyright: reportOperatorIssue=false, reportIndexIssue=false, reportAttributeAccessIssue=false
 
 import math
+from typing import no_type_check
 
 import numpy as np
 import warp as wp
 from jaxtyping import Bool, Float, Int, UInt8
 
-from vinl.nav.field_kernels import measure_across, measure_down, spread_distances, write_metres
+from vinl.sensing.warp_start import start_warp
+
+start_warp()
+wp.set_module_options({"enable_backward": False})
 
 _UNIT = 100
 """Distances are counted in hundredths of a cell."""
@@ -97,3 +103,124 @@ def measure_near_clearance(
 def _wrap(values: np.ndarray) -> wp.array:
     """The same memory, for a kernel."""
     return wp.array(values, copy=False, device="cpu")
+
+
+BUCKETS = wp.constant(256)
+"""More than the dearest step."""
+
+
+@wp.kernel
+@no_type_check
+def spread_distances(
+    mask: wp.array(dtype=wp.uint8),
+    goal: wp.array(dtype=wp.int32),
+    offset: wp.array(dtype=wp.int32),
+    cost: wp.array(dtype=wp.int32),
+    distance: wp.array(dtype=wp.int32, ndim=2),
+    head: wp.array(dtype=wp.int32, ndim=2),
+    following: wp.array(dtype=wp.int32, ndim=2),
+    cell: wp.array(dtype=wp.int32, ndim=2),
+):
+    """Dijkstra's search with buckets, one thread a goal. Cells of mask 2 are passed, cells of mask 1 only reached.
+
+    ``distance`` begins far off, and below 0 where no path enters. ``head`` holds a linked list of waiting entries for
+    each bucket, ``following`` and ``cell`` the entries.
+    """
+    k = wp.tid()
+    used = int(1)  # entries taken from the pool so far
+    spare = int(-1)  # list of entries given back
+    waiting = int(1)
+    band = int(0)
+    distance[k, goal[k]] = 0
+    head[k, 0] = 0
+    following[k, 0] = -1
+    cell[k, 0] = goal[k]
+    while waiting > 0:
+        bucket = band % BUCKETS
+        entry = head[k, bucket]
+        while entry >= 0:
+            head[k, bucket] = following[k, entry]
+            here = cell[k, entry]
+            following[k, entry] = spare
+            spare = entry
+            waiting = waiting - 1
+            if distance[k, here] == band and mask[here] == wp.uint8(2):
+                for s in range(offset.shape[0]):
+                    there = here + offset[s]
+                    total = band + cost[s]
+                    if total < distance[k, there]:
+                        fresh = spare
+                        if fresh >= 0:
+                            spare = following[k, fresh]
+                        else:
+                            fresh = used
+                            used = used + 1
+                        if fresh < cell.shape[1]:
+                            distance[k, there] = total
+                            target = total % BUCKETS
+                            cell[k, fresh] = there
+                            following[k, fresh] = head[k, target]
+                            head[k, target] = fresh
+                            waiting = waiting + 1
+            entry = head[k, bucket]
+        band = band + 1
+
+
+@wp.kernel
+@no_type_check
+def write_metres(
+    counted: wp.array(dtype=wp.int32, ndim=3),
+    border: wp.int32,
+    far: wp.int32,
+    unit: wp.float32,
+    metres: wp.array(dtype=wp.float16, ndim=3),
+):
+    """Counted distances (goal, row, column) without their border as metres (row, column, goal)."""
+    r, c = wp.tid()
+    for k in range(metres.shape[2]):
+        steps = counted[k, r + border, c + border]
+        metres[r, c, k] = wp.where(steps >= 0 and steps < far, wp.float16(wp.float32(steps) * unit), wp.float16(wp.inf))
+
+
+@wp.kernel
+@no_type_check
+def measure_down(free: wp.array(dtype=wp.uint8, ndim=2), reach: wp.int32, gap: wp.array(dtype=wp.int32, ndim=2)):
+    """Cells to the nearest one that is not free in the same column, at most ``reach``; outside nothing is free."""
+    column = wp.tid()
+    rows = free.shape[0]
+    run = int(0)
+    for r in range(rows):
+        run = wp.where(free[r, column] == wp.uint8(0), 0, wp.min(run + 1, reach))
+        gap[r, column] = run
+    run = int(0)
+    for i in range(rows):
+        r = rows - 1 - i
+        run = wp.where(free[r, column] == wp.uint8(0), 0, wp.min(run + 1, reach))
+        gap[r, column] = wp.min(gap[r, column], run)
+
+
+@wp.kernel
+@no_type_check
+def measure_across(
+    gap: wp.array(dtype=wp.int32, ndim=2),
+    reach: wp.int32,
+    resolution: wp.float32,
+    clearance: wp.array(dtype=wp.float16, ndim=2),
+):
+    """Distance [m] from a cell's centre to the edge of the nearest cell that is not free, held to ``reach`` cells."""
+    r, c = wp.tid()
+    columns = gap.shape[1]
+    best = gap[r, c] * gap[r, c]
+    d = int(1)
+    while d * d < best and d <= reach:
+        left = int(0)
+        right = int(0)
+        if c - d >= 0:
+            left = gap[r, c - d]
+        if c + d < columns:
+            right = gap[r, c + d]
+        near = wp.min(left, right)
+        best = wp.min(best, d * d + near * near)
+        d = d + 1
+    value = wp.max((wp.sqrt(wp.float32(best)) - 0.5) * resolution, 0.0)
+    clearance[r, c] = wp.float16(value)

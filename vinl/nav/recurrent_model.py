@@ -1,15 +1,26 @@
-"""An actor with memory and a critic on the same feature, as PPO trains them."""
+"""An actor with memory and a critic on the same feature, as PPO trains them; its roll-outs, of whole sequences with
+images in two bytes or one; and what a training starts from: fresh weights, or those of an earlier run."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
+from pathlib import Path
 from typing import Any, NamedTuple, Protocol, cast
 
 import torch
 from jaxtyping import Bool, Float
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
+from vinl.config.errors import InputError
+from vinl.nav.config import NavCameraConfig, NavConfig
+from vinl.policies.card import PolicyCard
 from vinl.policies.depth_memory import State
+from vinl.policies.io import load_policy
+from vinl.policies.nav_actor import PREVIOUS_SIZE, NavActor
 from vinl.policies.networks import PolicyNetwork
+from vinl.policies.own_map import MapGeometry
 
 
 class MemoryActor(Protocol):
@@ -126,3 +137,179 @@ def as_unit(depth: Tensor | None) -> Tensor | None:
     kind = depth.device.type
     wanted = torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else torch.float32
     return depth.to(wanted) / 255.0 if depth.dtype == torch.uint8 else depth.to(wanted)
+
+
+class Minibatch(NamedTuple):
+    """All steps of some of the robots; arguments of the model first. Shapes (t, n, ...), the state (layers, n, ...)."""
+
+    depth: Tensor | None
+    vector: Tensor
+    state: State
+    fresh: Tensor
+    actions: Tensor
+    log_prob: Tensor
+    means: Tensor
+    values: Tensor
+    advantages: Tensor
+    returns: Tensor
+    hidden: Tensor | None
+
+
+class RecurrentStorage:
+    """Buffers that are written during the roll-out and never reallocated.
+
+    Args:
+        steps, robots: t and n.
+        image: (height, width) of the images, or None.
+        image_type: one of ``config.IMAGE_TYPES``.
+        vector, actions, hidden: sizes; ``hidden`` 0: there is none.
+        state: of the robots at the start; its shapes are taken.
+        device: where the buffers lie.
+    """
+
+    def __init__(
+        self,
+        steps: int,
+        robots: int,
+        image: tuple[int, int] | None,
+        image_type: str,
+        vector: int,
+        actions: int,
+        state: State,
+        device: torch.device | str,
+        hidden: int = 0,
+    ) -> None:
+        def room(*size: int, dtype: torch.dtype = torch.float32) -> Tensor:
+            return torch.zeros(steps, robots, *size, dtype=dtype, device=device)
+
+        self.steps, self.robots = steps, robots
+        self.depth = room(*image, dtype=getattr(torch, image_type)) if image else None
+        self.vector, self.actions, self.means = room(vector), room(actions), room(actions)
+        self.hidden = room(hidden) if hidden else None
+        self.fresh, self.done = room(dtype=torch.bool), room(dtype=torch.bool)
+        self.log_prob, self.values, self.rewards = room(), room(), room()
+        self.advantages, self.returns = room(), room()
+        self.state = tuple(torch.zeros_like(part) for part in state)
+        self.log_std = torch.zeros(actions, device=device)
+
+    def as_stored(self, depth: Tensor) -> Tensor:
+        """Images in [0, 1] as they are kept; the policy acts on these, so that it learns from what it saw."""
+        assert self.depth is not None
+        if self.depth.dtype == torch.uint8:
+            return (depth * 255.0 + 0.5).to(torch.uint8)
+        return depth.to(self.depth.dtype)
+
+    def begin(self, state: State, log_std: Float[Tensor, " a"]) -> None:
+        """A roll-out begins with this memory and this spread of the actions."""
+        for part, now in zip(self.state, state, strict=True):
+            part.copy_(now)
+        self.log_std.copy_(log_std)
+
+    def estimate_advantages(self, last_values: Float[Tensor, " n"], gamma: float, lam: float) -> None:
+        """Generalised advantages and returns of the whole roll-out, not yet normalised."""
+        going_on = (~self.done).float()
+        advantage = torch.zeros_like(last_values)
+        following = last_values
+        for t in reversed(range(self.steps)):
+            error = self.rewards[t] + gamma * going_on[t] * following - self.values[t]
+            advantage = error + gamma * lam * going_on[t] * advantage
+            self.advantages[t] = advantage
+            following = self.values[t]
+        torch.add(self.advantages, self.values, out=self.returns)
+
+    def take(self, robots: Bool[Tensor, "..."] | Tensor) -> Minibatch:
+        """All steps of the robots of an index (n,)."""
+
+        def pick(buffer: Tensor) -> Tensor:
+            return buffer.index_select(1, robots)
+
+        return Minibatch(
+            depth=None if self.depth is None else pick(self.depth),
+            vector=pick(self.vector),
+            state=tuple(pick(part) for part in self.state),
+            fresh=pick(self.fresh),
+            actions=pick(self.actions),
+            log_prob=pick(self.log_prob),
+            means=pick(self.means),
+            values=pick(self.values),
+            advantages=pick(self.advantages),
+            returns=pick(self.returns),
+            hidden=None if self.hidden is None else pick(self.hidden),
+        )
+
+
+CRITIC = "critic.safetensors"
+"""File of a run beside its policy."""
+
+
+def build_actor(config: NavConfig) -> NavActor:
+    """A navigator with fresh weights."""
+    camera = config.camera
+    image: dict[str, Any] = {"vision": "none", "height": 1, "width": 1}
+    if camera is not None:
+        image = {"height": camera.height, "width": camera.width, "channels": 2 if camera.missing == "plane" else 1}
+    return NavActor(
+        **{
+            **asdict(config.network),
+            **image,
+            "previous": PREVIOUS_SIZE * (2 if config.previous == "both" else 1),
+            "places": _map_geometry(config).describe() if config.network.places else None,
+        }
+    )
+
+
+def _map_geometry(config: NavConfig) -> MapGeometry:
+    c, robot = config.camera or NavCameraConfig(), config.robot
+    return MapGeometry(
+        robot.min_speed,
+        robot.max_speed,
+        robot.max_yaw_rate,
+        robot.period,
+        c.hfov,
+        c.pitch_down,
+        c.far,
+        c.forward,
+        c.mount_height,
+    )
+
+
+def load_start(policy: str, config: NavConfig) -> tuple[dict[str, torch.Tensor], PolicyCard]:
+    """Weights and card of a trained navigator to start from.
+
+    Raises:
+        InputError: it is no navigator, or has another network than the configuration.
+    """
+    loaded = load_policy(policy)
+    with torch.device("meta"):
+        wanted = build_actor(config).describe()
+    if not isinstance(loaded.network, NavActor):
+        raise InputError(f"--from {policy}: a {loaded.card.kind} policy; give a navigator")
+    given = loaded.network.describe()
+    if given != wanted:
+        other = [f"{k} {given.get(k)} instead of {wanted[k]}" for k in wanted if given.get(k) != wanted[k]]
+        raise InputError(f"--from {policy}: another network than the config's: {', '.join(other)}")
+    return loaded.network.state_dict(), loaded.card
+
+
+def save_critic(model: RecurrentActorCritic, folder: Path) -> None:
+    """What a policy folder leaves away, for ``--from``: the critic, and the spread of the actions."""
+    rest = {k: v.detach().cpu().contiguous() for k, v in model.state_dict().items() if not k.startswith("actor.")}
+    scratch = folder / (CRITIC + ".new")
+    save_file(rest, scratch)
+    scratch.replace(folder / CRITIC)
+
+
+def load_critic(model: RecurrentActorCritic, folder: Path) -> bool:
+    """Take up what ``save_critic`` left in a run's folder, if there is such a file and it is of the same shape."""
+    file = folder / CRITIC
+    if not file.is_file():
+        return False
+    try:
+        rest = load_file(file)
+    except (SafetensorError, OSError) as error:
+        raise InputError(f"{file} is broken ({error}); remove it to start with a fresh critic") from None
+    own = {k: v for k, v in model.state_dict().items() if not k.startswith("actor.")}
+    if {k: v.shape for k, v in rest.items()} != {k: v.shape for k, v in own.items()}:
+        return False
+    model.load_state_dict(rest, strict=False)
+    return True

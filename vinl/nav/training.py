@@ -18,9 +18,8 @@ from vinl.config.loader import build_config, dump_config
 from vinl.nav.config import NavConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.home_store import HomeStore
-from vinl.nav.recurrent_model import RecurrentActorCritic
+from vinl.nav.recurrent_model import RecurrentActorCritic, build_actor, load_critic, load_start, save_critic
 from vinl.nav.recurrent_ppo import RecurrentPPO, build_storage, count_guesses
-from vinl.nav.warm_start import build_actor, load_critic, load_start, save_critic
 from vinl.policies.card import PolicyCard, navigation_card
 from vinl.policies.io import save_policy
 from vinl.policies.lineage import find_commit, trace_lineage
