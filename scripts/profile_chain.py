@@ -23,9 +23,8 @@ from vinl.benchmark.protocol import LARGEST
 from vinl.chain.batching import BatchedPolicy, ask_only
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.depth_cameras import DepthCameras
-from vinl.chain.episode import draw_routes, draw_setup
+from vinl.chain.episode import Recorder, draw_routes, draw_setup
 from vinl.chain.navigators.oracle import OracleNavigator
-from vinl.chain.recorder import Recorder
 from vinl.chain.robot import Robot
 from vinl.chain.rollout import run_episodes
 from vinl.chain.workers import one_thread

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from vinl.chain.choose import check_locomotion_policy
 from vinl.chain.controller import open_controller
-from vinl.chain.odometry import measure_twist
+from vinl.chain.navigators.learned import measure_twist
 from vinl.chain.robot import Robot, Robots
 from vinl.chain.scene import build_scene
 from vinl.chain.workers import Context, WorkerPool

@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from vinl.benchmark.protocol import Row
-from vinl.benchmark.table_config import IDEAL, FaultMatrix
-from vinl.chain.config import EvaluationConfig
-from vinl.chain.fault_config import FaultConfig
+from vinl.benchmark.table import IDEAL, FaultMatrix
+from vinl.chain.config import EvaluationConfig, FaultConfig
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.cli.app import main
 from vinl.config.errors import InputError

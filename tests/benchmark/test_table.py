@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from vinl.benchmark.table_config import TableConfig
+from vinl.benchmark.table import TableConfig
 from vinl.cli.app import main
 from vinl.config.loader import load_config
 from vinl.policies.io import save_policy

@@ -4,8 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from vinl.chain.contacts import KINDS, ContactReader
-from vinl.chain.robot import Robot
+from vinl.chain.robot import KINDS, ContactReader, Robot
 from vinl.chain.scene import build_scene
 from vinl.robot.aliengo import DEFAULT_POSE
 from vinl.world.boxes import Boxes

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from small_home import RECORD
 
-from vinl.chain.contacts import KINDS
-from vinl.chain.failures import FAILURES, count_failures, find_cause, measure_distance, read_failure
+from vinl.chain.metrics import FAILURES, count_failures, find_cause, measure_distance, read_failure
+from vinl.chain.robot import KINDS
 from vinl.world.boxes import Blocks
 from vinl.world.endings import END_REASONS, name_late_end
 from vinl.world.floorplan import FloorPlan

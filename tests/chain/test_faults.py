@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from vinl.chain.choose import load_navigator
-from vinl.chain.config import EvaluationConfig
+from vinl.chain.config import EvaluationConfig, FaultConfig
 from vinl.chain.episode import draw_routes, draw_setup
-from vinl.chain.fault_config import FaultConfig
-from vinl.chain.faults import FaultyState, change_body
-from vinl.chain.robot import DelayLine
+from vinl.chain.robot import DelayLine, FaultyState, change_body
 from vinl.chain.rollout import run_episodes
 from vinl.chain.scene import build_scene
 from vinl.config.errors import InputError

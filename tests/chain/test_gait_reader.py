@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vinl.chain.gait_reader import GaitReader, map_plan
+from vinl.chain.ground_reader import GaitReader, map_plan
 from vinl.gait.config import GaitConfig
 from vinl.robot.aliengo import CONTROL_DT, home_qpos
 from vinl.world.boxes import Blocks, Boxes

@@ -9,8 +9,7 @@ from vinl.chain.choose import load_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_routes
 from vinl.chain.navigators.base import Task, goal_in_heading_frame
-from vinl.chain.navigators.oracle import OracleNavigator
-from vinl.chain.navigators.path import plan_path
+from vinl.chain.navigators.oracle import OracleNavigator, plan_path
 from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import FloorPlan

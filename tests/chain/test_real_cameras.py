@@ -11,8 +11,8 @@ import torch
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.depth_cameras import open_depth_cameras
 from vinl.chain.episode import draw_routes, draw_setups
+from vinl.chain.navigators.learned import DeadReckoning
 from vinl.chain.navigators.oracle import OracleNavigator
-from vinl.chain.odometry import DeadReckoning
 from vinl.chain.real_cameras import CameraErrors
 from vinl.chain.rollout import run_episodes
 from vinl.cli.app import main

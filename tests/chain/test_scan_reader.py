@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vinl.chain.scan_reader import ScanReader
+from vinl.chain.ground_reader import ScanReader
 from vinl.robot.aliengo import home_qpos
 from vinl.robot.observation import SCAN_POINTS
 from vinl.sensing.detour import DetourConfig

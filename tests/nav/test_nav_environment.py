@@ -107,8 +107,8 @@ def test_a_cancelled_step_is_seen_unless_the_paper_asks(config, homes, previous)
 
 @pytest.mark.parametrize("lowest", [0.0, -0.3])
 def test_the_motion_seen_is_what_the_poses_say(config, homes, lowest):
-    """The chain measures the same from the poses of the robot's trunk (``vinl.chain.odometry``)."""
-    from vinl.chain.odometry import measure_twist
+    """The chain measures the same from the poses of the robot's trunk (``vinl.chain.navigators.learned``)."""
+    from vinl.chain.navigators.learned import measure_twist
     from vinl.nav.config import ExecutionConfig
 
     execution = ExecutionConfig(lag=0.1, speed_gain=(0.8, 1.0), yaw_noise=0.2, speed_noise=0.1, side_slip=0.1)

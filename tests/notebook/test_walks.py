@@ -13,7 +13,7 @@ from PIL import Image
 from torch.nn.modules.module import register_module_forward_pre_hook
 
 import vinl
-from vinl.chain import progress_line
+from vinl.chain import workers
 from vinl.config.errors import InputError
 from vinl.notebook.film import cut_episode
 
@@ -132,11 +132,11 @@ def test_torch_works_with_one_thread_and_gets_its_own_back() -> None:
 
 
 def test_a_bar_is_shown_to_those_who_watch(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
-    monkeypatch.setattr(progress_line, "_DELAY", 0.0)
+    monkeypatch.setattr(workers, "_DELAY", 0.0)
     rules = replace(SHORT, time_limit=1.0)
     vinl.walk(PLAN, "rough", "oracle", config=rules)
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr(progress_line, "is_watched", lambda: True)
+    monkeypatch.setattr(workers, "is_watched", lambda: True)
     monkeypatch.setenv("FORCE_COLOR", "1")
     vinl.walk(PLAN, "rough", "oracle", config=rules)
     bar = capsys.readouterr().err

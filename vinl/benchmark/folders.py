@@ -22,8 +22,7 @@ from vinl.benchmark.journal import (
 from vinl.benchmark.metrics import aggregate_episodes
 from vinl.benchmark.protocol import each_key
 from vinl.benchmark.report import render_report, render_table_report
-from vinl.benchmark.table import Table, TableRow, summarise_table
-from vinl.benchmark.table_config import PaperFigures, RowConfig, TableConfig
+from vinl.benchmark.table import PaperFigures, RowConfig, Table, TableConfig, TableRow, summarise_table
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.records import Results, plain_record
 from vinl.config.errors import InputError

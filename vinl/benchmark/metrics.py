@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from vinl.chain.failures import count_failures
-from vinl.chain.metrics import bootstrap_interval, summarise
+from vinl.chain.metrics import bootstrap_interval, count_failures, summarise
 from vinl.chain.records import EpisodeRecord, Key
 from vinl.world.endings import END_REASONS
 

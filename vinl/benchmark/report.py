@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 from rich.console import Console
 
 from vinl.benchmark.metrics import aggregate_episodes
-from vinl.benchmark.table import find_comparison
-from vinl.benchmark.table_config import PaperFigures, TableConfig
-from vinl.chain.failures import FAILURES, read_failure
+from vinl.benchmark.table import PaperFigures, TableConfig, find_comparison
+from vinl.chain.metrics import FAILURES, read_failure
 from vinl.chain.records import EpisodeRecord, Results
 from vinl.config.loader import load_config
 from vinl.config.output import describe_environment

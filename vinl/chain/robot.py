@@ -1,17 +1,93 @@
-"""One robot in its own MuJoCo data: spawn it, drive it for one action, keep the recorder of its episode."""
+"""One robot in its own MuJoCo data: spawn it, drive it for one action, latch what it touches over the physics steps (a
+touch of 5 ms counts); a body that differs from its model, a state that is measured with errors."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from vinl.chain.contacts import ContactReader
-from vinl.robot.aliengo import CONTROL_DT, STANDING_HEIGHT, SUBSTEPS, home_qpos
+from vinl.chain.config import FaultConfig
+from vinl.chain.scene import BLOCKS, FORCE_SENSORS, TOUCH_SENSORS, WALLS
+from vinl.robot.aliengo import CONTROL_DT, FOOT_GEOMS, STANDING_HEIGHT, SUBSTEPS, home_qpos
+from vinl.robot.rotation import matrix_of
+
+KINDS = ("foot_block", "foot_wall", "leg_block", "leg_wall", "trunk_block", "trunk_wall")
+"""What may touch what. A leg is hip, thigh and shank; furniture counts as wall."""
+
+FOOT_LIFT = 0.05
+"""The paper's rule: a foot whose middle is higher than this [m] stands on something [ViNL code]."""
+
+STUMBLE_RATIO = 5.0
+"""The paper's rule: a horizontal force of so many times the vertical one hits a side [ViNL code]."""
+
+
+class Touch(NamedTuple):
+    """One kind of contact in one control step: index into ``KINDS``, and where [m]."""
+
+    kind: int
+    x: float
+    y: float
+    z: float
+
+
+class ContactReader:
+    """Reads one robot's contacts after each ``mj_step``. ``data`` must stay the one it was made for."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        self._data = data
+        names = [model.body(k).name for k in range(model.nbody)]
+        of_body = [1 if name.endswith(("_hip", "_thigh", "_calf")) else 2 if name == "trunk" else -1 for name in names]
+        part = np.array(of_body)[model.geom_bodyid]
+        part[[model.geom(name).id for name in FOOT_GEOMS]] = 0
+        obstacle = np.full(model.ngeom, -1)
+        for k, name in enumerate((BLOCKS, WALLS)):
+            obstacle[model.geom_bodyid == model.body(name).id] = k
+        self._part, self._obstacle = part, obstacle
+        adr = [int(model.sensor(name).adr[0]) for name in TOUCH_SENSORS]
+        self._touch = data.sensordata[adr[0] : adr[0] + 2]
+        self._ground = data.sensordata[adr[2] : adr[2] + 1]
+        adr = int(model.sensor(FORCE_SENSORS[0]).adr[0])
+        self._forces = data.sensordata[adr : adr + 12].reshape(4, 3)
+        first = [int(model.geom(name).id) for name in FOOT_GEOMS]
+        self._feet = [data.geom_xpos[g] for g in first]
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the touches: a new control step begins."""
+        self.touches: dict[int, Touch] = {}
+        self.trunk_on_ground = False
+
+    def look(self) -> None:
+        """Latch what the last physics step touched."""
+        if self._ground[0]:
+            self.trunk_on_ground = True
+        if self._touch[0] or self._touch[1]:
+            self._classify()
+
+    def _classify(self) -> None:
+        contact = self._data.contact
+        geoms = contact.geom
+        part, obstacle = self._part[geoms].max(1), self._obstacle[geoms].max(1)
+        for k in np.flatnonzero((part >= 0) & (obstacle >= 0)):
+            kind = int(2 * part[k] + obstacle[k])
+            if kind not in self.touches:
+                self.touches[kind] = Touch(kind, *contact.pos[k].tolist())
+
+    def breaks_paper_rule(self) -> bool:
+        """The paper's own count, from the last physics step of the control step: any foot higher than 0.05 m with any
+        vertical force, or with a horizontal force of five times the vertical one [ViNL code]."""
+        for foot, (fx, fy, fz) in zip(self._feet, self._forces.tolist(), strict=True):
+            if fx == 0.0 and fy == 0.0 and fz == 0.0:
+                continue
+            if (foot[2] >= FOOT_LIFT and fz != 0.0) or np.hypot(fx, fy) > STUMBLE_RATIO * abs(fz):
+                return True
+        return False
 
 
 class DelayLine:
@@ -105,3 +181,59 @@ class Robots:
     def read(self, k: int) -> None:
         """Take over the state of a robot that was put somewhere."""
         self.qpos[k], self.qvel[k] = self._robots[k].qpos, self._robots[k].qvel
+
+
+BIAS_TIME = 1.0
+"""The velocity bias forgets itself over this time [s]: an estimator's drift, not white noise."""
+
+ANGULAR_NOISE, TILT_NOISE = 0.2, 0.05
+"""Half-widths of the uniform noise that ``imu_noise`` multiplies: of the angular velocity [rad/s] and of the direction
+of gravity [rad], as in legged_gym's training [ViNL config]."""
+
+
+def change_body(model: mujoco.MjModel, faults: FaultConfig) -> None:
+    """Masses and friction of a compiled world, in place."""
+    if faults.friction_scale != 1:
+        model.geom_friction[:] *= faults.friction_scale
+    if faults.mass_scale != 1:
+        model.body_mass[:] *= faults.mass_scale
+        model.body_inertia[:] *= faults.mass_scale
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+
+
+class FaultyState:
+    """What n robots know of their velocity and attitude in place of what is. Every robot has random numbers of its own.
+
+    Args:
+        faults: what is wrong.
+        rngs: the only sources of chance, one for each robot.
+    """
+
+    def __init__(self, faults: FaultConfig, rngs: Sequence[np.random.Generator]) -> None:
+        self._faults = faults
+        # a stream for each sensor: a fault of one changes no number of another
+        self._velocity, self._imu = zip(*(rng.spawn(2) for rng in rngs), strict=True)
+        self._bias = faults.velocity_bias * np.stack([rng.standard_normal(3) for rng in self._velocity])
+
+    def measure(
+        self, qpos: Float[np.ndarray, "n 19"], qvel: Float[np.ndarray, "n 18"], rows: Sequence[int]
+    ) -> tuple[Float[np.ndarray, "n 19"], Float[np.ndarray, "n 18"]]:
+        """Position and velocity as the robots know them, as new arrays. To be called once in every control step.
+
+        Args:
+            qpos, qvel: as they are.
+            rows: the robots that still walk.
+        """
+        faults, qpos, qvel = self._faults, qpos.copy(), qvel.copy()
+        keep = math.exp(-CONTROL_DT / BIAS_TIME)
+        for k in rows:
+            drift, white = self._velocity[k].standard_normal((2, 3))
+            self._bias[k] = keep * self._bias[k] + math.sqrt(1 - keep**2) * faults.velocity_bias * drift
+            error = self._bias[k] + faults.velocity_noise * white
+            qvel[k, :3] += matrix_of(np, qpos[k : k + 1, 3:7])[0] @ error
+            if faults.imu_noise > 0:
+                turning, tilt = self._imu[k].uniform(-faults.imu_noise, faults.imu_noise, (2, 3))
+                qvel[k, 3:6] += ANGULAR_NOISE * turning
+                tilt[2] = 0.0  # gravity tells nothing of the heading
+                mujoco.mju_quatIntegrate(qpos[k, 3:7], TILT_NOISE * tilt, 1.0)
+        return qpos, qvel

@@ -98,8 +98,7 @@ def main(argv: list[str]) -> int:
     options = parse_options(Options, settings_first(Options, argv), "eval")
     from vinl.benchmark.evaluate import check_numbers, name_apart
     from vinl.benchmark.folders import check_folder
-    from vinl.benchmark.protocol import Films, Protocol
-    from vinl.benchmark.routes import read_routes
+    from vinl.benchmark.protocol import Films, Protocol, read_routes
     from vinl.chain.choose import best_locomotor, best_navigator
     from vinl.config.output import check_out, strip_command
     from vinl.world.readers import load_floorplans
@@ -159,8 +158,7 @@ def _run_faults(options: Options, out: Path, prepare: Callable[[], Protocol], co
 
     from vinl.benchmark.folders import RESULTS_FILE, write_run
     from vinl.benchmark.report import print_faults
-    from vinl.benchmark.table import summarise_faults
-    from vinl.benchmark.table_config import FaultMatrix
+    from vinl.benchmark.table import FaultMatrix, summarise_faults
     from vinl.config.loader import load_config
     from vinl.config.output import write_json
 
@@ -187,8 +185,7 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], com
 
     from vinl.benchmark.folders import keep_table, leave_out, write_table
     from vinl.benchmark.report import print_table
-    from vinl.benchmark.table import Table, TableRow
-    from vinl.benchmark.table_config import TableConfig
+    from vinl.benchmark.table import Table, TableConfig, TableRow
     from vinl.config.loader import load_config
 
     for name, given in (

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool
 
-from vinl.chain.contacts import KINDS, ContactReader
+from vinl.chain.robot import KINDS, ContactReader
 from vinl.chain.scene import BLOCKS
 from vinl.robot.aliengo import FOOT_GEOMS, LEGS
 

@@ -9,9 +9,8 @@ from jaxtyping import Bool, Float
 
 from vinl.chain.controller import LocomotionController
 from vinl.chain.depth_cameras import DepthCameras
-from vinl.chain.gait_reader import GaitReader, map_ground
+from vinl.chain.ground_reader import GaitReader, ScanReader, map_ground
 from vinl.chain.metrics import tracking_errors
-from vinl.chain.scan_reader import ScanReader
 from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import Course
 from vinl.courses.gait_metrics import record_gait

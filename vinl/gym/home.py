@@ -14,7 +14,7 @@ from jaxtyping import Float, UInt8
 from vinl.chain.choose import choose_locomotor
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_routes, draw_setup
-from vinl.chain.odometry import measure_twist
+from vinl.chain.navigators.learned import measure_twist
 from vinl.chain.records import plain_record
 from vinl.chain.workers import one_thread
 from vinl.config.errors import InputError

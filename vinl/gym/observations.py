@@ -10,7 +10,7 @@ from gymnasium import spaces
 from jaxtyping import Float
 
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
-from vinl.chain.scan_reader import ScanReader
+from vinl.chain.ground_reader import ScanReader
 from vinl.config.errors import InputError
 from vinl.config.loader import closest
 from vinl.gym.trip import Trip

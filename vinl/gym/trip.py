@@ -6,13 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.contacts import KINDS
-from vinl.chain.episode import EpisodeSetup
+from vinl.chain.episode import EpisodeSetup, Recorder
 from vinl.chain.metrics import tracking_errors
 from vinl.chain.navigators.base import Task, goal_in_heading_frame
-from vinl.chain.recorder import Recorder
 from vinl.chain.records import Episode
-from vinl.chain.robot import Robot
+from vinl.chain.robot import KINDS, Robot
 from vinl.chain.scene import build_scene
 from vinl.robot.aliengo import CONTROL_DT, KD, KP
 from vinl.robot.rotation import yaw_of

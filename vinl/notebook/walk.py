@@ -16,10 +16,9 @@ from vinl.chain.config import EvaluationConfig
 from vinl.chain.depth_cameras import open_depth_cameras
 from vinl.chain.episode import draw_routes, draw_setup
 from vinl.chain.navigators.base import Navigator
-from vinl.chain.progress_line import show_line
 from vinl.chain.records import Episode, EpisodeRecord, EpisodeTrace
 from vinl.chain.rollout import run_episodes
-from vinl.chain.workers import one_thread
+from vinl.chain.workers import one_thread, show_line
 from vinl.config.errors import InputError
 from vinl.config.loader import closest
 from vinl.notebook.plans import draw_plan, embed_image, open_plan

@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from PIL import Image
 
-from vinl.chain.contacts import KINDS
 from vinl.chain.records import Episode, EpisodeTrace
+from vinl.chain.robot import KINDS
 from vinl.robot.aliengo import LENGTH
 from vinl.world.boxes import Blocks, Boxes
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan

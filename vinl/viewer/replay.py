@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from vinl.chain.contacts import KINDS
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.chain.records import Episode
+from vinl.chain.robot import KINDS
 from vinl.config.errors import InputError
 from vinl.render.video import POSE_DT
 from vinl.robot.aliengo import FOOT_GEOMS

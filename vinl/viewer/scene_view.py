@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from jaxtyping import Float, UInt8
 
-from vinl.chain.contacts import KINDS
+from vinl.chain.robot import KINDS
 from vinl.render.robot_shape import RobotShape
 from vinl.render.scene import BLOCK, FLOOR, plan_scene
 from vinl.robot.cameras import Camera
