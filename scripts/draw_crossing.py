@@ -15,11 +15,10 @@ from pathlib import Path
 from PIL import Image
 
 from vinl.chain.workers import one_thread
-from vinl.courses.bars import BarConfig, build_corridor
-from vinl.courses.crossing import Crossing, cross_bar
-from vinl.courses.crossing_pictures import draw_feet, film_crossings
+from vinl.courses.crossing import BarConfig, Crossing, build_corridor, cross_bar
 from vinl.courses.evaluate import GROUP
 from vinl.courses.evaluate_crossings import aggregate_crossings
+from vinl.courses.report import draw_feet, film_crossings
 from vinl.policies.io import load_policy
 
 

@@ -21,9 +21,8 @@ from matplotlib.patches import Polygon
 from vinl.chain.workers import one_thread
 from vinl.courses.courses import Course, command_ranges
 from vinl.courses.grounds import Ground, GroundConfig, build_ground
-from vinl.courses.herd import BoxHerd
 from vinl.courses.robot_records import aggregate_robots
-from vinl.courses.trial import run_trial
+from vinl.courses.trial import BoxHerd, run_trial
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT

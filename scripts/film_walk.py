@@ -15,11 +15,9 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 import vinl
-from vinl.render.chase_camera import ChaseCamera
 from vinl.render.panels import colour_depth
-from vinl.render.raytrace import RayRenderer
-from vinl.render.robot_shape import RobotShape
-from vinl.render.scene import plan_scene
+from vinl.render.raytrace import ChaseCamera, RayRenderer
+from vinl.render.scene import RobotShape, plan_scene
 from vinl.render.video import POSE_DT
 from vinl.robot.rotation import yaw_of
 

@@ -12,10 +12,8 @@ import imageio.v3 as iio
 import matplotlib as mpl
 import numpy as np
 
-from vinl.render.chase_camera import ChaseCamera
-from vinl.render.raytrace import RayRenderer, look_at
-from vinl.render.robot_shape import RobotShape
-from vinl.render.scene import BLOCK, plain_scene, plan_scene
+from vinl.render.raytrace import ChaseCamera, RayRenderer, look_at
+from vinl.render.scene import BLOCK, RobotShape, plain_scene, plan_scene
 from vinl.robot.aliengo import home_qpos
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
 from vinl.sensing.depth import DepthCamera

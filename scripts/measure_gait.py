@@ -21,8 +21,7 @@ from vinl.courses.grounds import GroundConfig, build_ground
 from vinl.courses.trial import controller_on_course
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
-from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, FOOT_RADIUS
-from vinl.robot.kinematics import foot_positions
+from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, FOOT_RADIUS, foot_positions
 from vinl.robot.rotation import yaw_of
 
 AIR = 0.008

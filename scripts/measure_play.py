@@ -16,8 +16,7 @@ from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_routes
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.viewer.live import LiveChain
-from vinl.viewer.requests import Reset, SetGoal
-from vinl.viewer.session import LOOK_EVERY
+from vinl.viewer.session import LOOK_EVERY, Reset, SetGoal
 from vinl.viewer.world import open_home
 from vinl.world.readers import load_floorplan
 

@@ -27,9 +27,8 @@ from vinl.chain.workers import one_thread
 from vinl.courses.block_contacts import BlockContacts
 from vinl.courses.courses import COMMANDS, Course, Start, choose_commands, command_ranges
 from vinl.courses.grounds import Ground, GroundConfig, build_ground
-from vinl.courses.herd import BoxHerd, Herd
 from vinl.courses.robot_records import RobotRecord, aggregate_robots
-from vinl.courses.trial import run_trial
+from vinl.courses.trial import BoxHerd, Herd, run_trial
 from vinl.loco.randomisation import plain_traits
 from vinl.loco.simulation import PAST, Body, Simulation
 from vinl.policies.io import load_policy

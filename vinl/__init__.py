@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from vinl.chain.config import EvaluationConfig as EvaluationConfig
     from vinl.config.errors import InputError as InputError
     from vinl.config.loader import load_config as load_config
-    from vinl.notebook.film import Film as Film
-    from vinl.notebook.film import show_video as show_video
     from vinl.notebook.own import as_locomotor as as_locomotor
     from vinl.notebook.own import as_navigator as as_navigator
     from vinl.notebook.plans import draw_plan as draw_plan
@@ -23,7 +21,9 @@ if TYPE_CHECKING:
     from vinl.notebook.plans import scatter_clutter as scatter_clutter
     from vinl.notebook.training import Training as Training
     from vinl.notebook.training import train as train
+    from vinl.notebook.walk import Film as Film
     from vinl.notebook.walk import Walk as Walk
+    from vinl.notebook.walk import show_video as show_video
     from vinl.notebook.walk import walk as walk
     from vinl.policies.card import PolicyCard as PolicyCard
     from vinl.policies.io import list_policies as list_policies
@@ -46,7 +46,7 @@ _WHERE = {
     "Boxes": "vinl.world.boxes",
     "Camera": "vinl.robot.cameras",
     "EvaluationConfig": "vinl.chain.config",
-    "Film": "vinl.notebook.film",
+    "Film": "vinl.notebook.walk",
     "FloorPlan": "vinl.world.floorplan",
     "InputError": "vinl.config.errors",
     "LOCOMOTION_CAMERA": "vinl.robot.cameras",
@@ -69,7 +69,7 @@ _WHERE = {
     "save_policy": "vinl.policies.io",
     "scatter_clutter": "vinl.notebook.plans",
     "shipped_floorplans": "vinl.world.readers",
-    "show_video": "vinl.notebook.film",
+    "show_video": "vinl.notebook.walk",
     "train": "vinl.notebook.training",
     "walk": "vinl.notebook.walk",
 }

@@ -19,8 +19,7 @@ from vinl.cli.app import main
 from vinl.policies.io import load_policy
 from vinl.robot.aliengo import home_qpos
 from vinl.robot.cameras import NAVIGATION_CAMERA
-from vinl.sensing.odometry_config import OdometryConfig
-from vinl.sensing.sensor_config import SensorConfig, load_sensors
+from vinl.sensing.sensor_config import OdometryConfig, SensorConfig, load_sensors
 from vinl.world.boxes import Blocks
 from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan

@@ -18,8 +18,8 @@ from vinl.config.errors import InputError
 from vinl.courses.evaluate import TrialResults
 from vinl.courses.report import _COLUMNS, print_comparison
 from vinl.nav.training import describe_figures
-from vinl.rl.out_of_memory import explain_out_of_memory
-from vinl.rl.progress import TrainingProgress
+from vinl.rl.loop import TrainingProgress
+from vinl.rl.machine import explain_out_of_memory
 from vinl.rl.run_folder import RunFolder
 
 HELPS = [
@@ -151,7 +151,7 @@ def test_training_bar_fits_80_columns() -> None:
 
 def test_piped_training_says_a_line_a_minute(monkeypatch) -> None:
     lines, clock = io.StringIO(), [1000.0]
-    monkeypatch.setattr("vinl.rl.progress.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("vinl.rl.loop.time.monotonic", lambda: clock[0])
     with TrainingProgress(100, 0, Console(file=lines, width=80)) as progress:
         for k in range(1, 101):
             clock[0] += 10.0

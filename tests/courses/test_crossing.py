@@ -8,11 +8,21 @@ import mujoco
 import numpy as np
 import pytest
 
-from vinl.courses import crossing_pictures
-from vinl.courses.bars import APPROACH, SPREAD, WIDTH, BarConfig, build_corridor, draw_start
-from vinl.courses.crossing import CrossingRecord, CrossingTrace, cross_bar, steer
+from vinl.courses import report
+from vinl.courses.crossing import (
+    APPROACH,
+    SPREAD,
+    WIDTH,
+    BarConfig,
+    CrossingRecord,
+    CrossingTrace,
+    build_corridor,
+    cross_bar,
+    draw_start,
+    steer,
+)
 from vinl.courses.evaluate_crossings import aggregate_crossings, compare_crossings
-from vinl.courses.herd import BoxHerd
+from vinl.courses.trial import BoxHerd
 from vinl.policies.io import load_policy
 from vinl.policies.policy import LocomotionPolicy
 from vinl.robot.aliengo import CONTROL_DT, home_qpos
@@ -152,15 +162,13 @@ def test_figures_of_known_records() -> None:
 
 @pytest.mark.parametrize("name", ["bar.mp4", "bar.gif"])
 def test_pictures_are_written(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(crossing_pictures, "SIZE", (64, 32))
+    monkeypatch.setattr(report, "SIZE", (64, 32))
     qpos = np.stack([home_qpos(x) for x in np.linspace(-1.2, 1.2, 13)])
     touching = np.zeros((13, 4), bool)
     touching[6] = True
     traces = {name: CrossingTrace(qpos, touching, touching, touching[:, 0]) for name in "ab"}
-    crossing_pictures.draw_feet(
-        {name: [trace, trace] for name, trace in traces.items()}, 0.1, 0.2, Path("out/feet.png")
-    )
-    crossing_pictures.film_crossings(traces, 0.1, 0.2, Path("out") / name)
+    report.draw_feet({name: [trace, trace] for name, trace in traces.items()}, 0.1, 0.2, Path("out/feet.png"))
+    report.film_crossings(traces, 0.1, 0.2, Path("out") / name)
     assert sorted(p.name for p in Path("out").iterdir()) == sorted([name, "feet.png"])
     with imageio.get_reader(Path("out") / name) as film:
         assert film.get_data(0).shape[:2] == (64, 64)

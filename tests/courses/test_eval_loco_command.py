@@ -40,7 +40,7 @@ def test_bars_write_the_names_that_others_read(policies: list[str], capsys: pyte
 
 
 def test_policies_are_compared_over_bars_and_filmed(policies: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vinl.courses.crossing_pictures.SIZE", (64, 32))
+    monkeypatch.setattr("vinl.courses.report.SIZE", (64, 32))
     command = f"eval-loco --compare {' '.join(policies)} --terrain bars --crossings 1 --workers 1 --video --out both"
     assert main(command.split()) == 0
     data = json.loads(Path("both/results.json").read_text())

@@ -8,8 +8,8 @@ from vinl.courses.block_contacts import BINS
 from vinl.courses.courses import COMMANDS, FIXED, Course, Start, choose_commands, command_ranges, draw_commands
 from vinl.courses.evaluate import compare_locomotors
 from vinl.courses.grounds import GroundConfig, build_ground
-from vinl.courses.herd import BoxHerd
 from vinl.courses.robot_records import RobotRecord, aggregate_robots
+from vinl.courses.trial import BoxHerd
 from vinl.policies.policy import LocomotionPolicy
 from vinl.robot.aliengo import DEFAULT_POSE
 from vinl.world.boxes import Blocks, Boxes

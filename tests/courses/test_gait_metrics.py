@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from vinl.courses.gait_metrics import GaitRecord, aggregate_gait, record_gait
-from vinl.courses.strain import Strain
-from vinl.robot.aliengo import MASS, home_qpos
-from vinl.robot.kinematics import foot_positions
+from vinl.courses.block_contacts import Strain
+from vinl.courses.robot_records import GaitRecord, aggregate_gait, record_gait
+from vinl.robot.aliengo import MASS, foot_positions, home_qpos
 
 
 def test_feet_that_meet_and_feet_above_their_hip_are_seen():

@@ -7,11 +7,9 @@ import pytest
 from vinl.courses.courses import FIXED, FOOT_CLEARANCE, Course
 from vinl.courses.evaluate import compare_locomotors
 from vinl.courses.grounds import LITTER_FIELD, GroundConfig, build_ground
-from vinl.courses.herd import BoxHerd
-from vinl.courses.trial import run_trial
+from vinl.courses.trial import BoxHerd, run_trial
 from vinl.policies.policy import LocomotionPolicy
-from vinl.robot.aliengo import CONTROL_DT, home_qpos
-from vinl.robot.kinematics import foot_positions
+from vinl.robot.aliengo import CONTROL_DT, foot_positions, home_qpos
 
 SPARSE = GroundConfig("litter", 5.0, None, 0, 40.0, 2.0)
 

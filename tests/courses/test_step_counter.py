@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vinl.courses.step_counter import StepCounter
+from vinl.courses.robot_records import StepCounter
 
 ALL = np.ones(1, bool)
 LEG, NONE = np.array([[True, False, False, False]]), np.zeros((1, 4), bool)

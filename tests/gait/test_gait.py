@@ -30,8 +30,7 @@ from vinl.gait.state import (
     tick,
     time_to_touch_down,
 )
-from vinl.robot.aliengo import CONTROL_DT, home_qpos
-from vinl.robot.kinematics import HIPS, LINK
+from vinl.robot.aliengo import CONTROL_DT, HIPS, LINK, home_qpos
 from vinl.world.boxes import Boxes
 from vinl.world.grid import BLOCK, GridFrame, flat_field, raise_boxes
 

@@ -30,8 +30,7 @@ from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import find_gait, locomotion_card
 from vinl.policies.io import find_policy, load_policy, save_policy
 from vinl.policies.networks import StepActor, build_network
-from vinl.robot.aliengo import DEFAULT_POSE, FOOT_GEOMS, home_qpos
-from vinl.robot.kinematics import foot_positions
+from vinl.robot.aliengo import DEFAULT_POSE, FOOT_GEOMS, foot_positions, home_qpos
 from vinl.robot.model import robot_spec
 from vinl.world.terrain import TILE, build_terrain
 

@@ -10,8 +10,7 @@ import torch
 from vinl.nav.config import EpisodeConfig, ExecutionConfig, MotionConfig, NavCameraConfig, NavRewardConfig, ViewConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.sensing.depth import DepthCamera
-from vinl.sensing.odometry_config import OdometryConfig
-from vinl.sensing.sensor_config import SensorConfig
+from vinl.sensing.sensor_config import OdometryConfig, SensorConfig
 from vinl.world.mesh import floorplan_mesh
 from vinl.world.readers import load_floorplan
 

@@ -15,7 +15,7 @@ from torch.nn.modules.module import register_module_forward_pre_hook
 import vinl
 from vinl.chain import workers
 from vinl.config.errors import InputError
-from vinl.notebook.film import cut_episode
+from vinl.notebook.walk import cut_episode
 
 PLAN = "harbour_flat"
 SHORT = vinl.EvaluationConfig(time_limit=2.0, min_distance=2.0)

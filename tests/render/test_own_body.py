@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vinl.render.robot_shape import RobotShape
+from vinl.render.scene import RobotShape
 from vinl.robot.aliengo import home_qpos
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
 from vinl.sensing.depth import DepthCamera

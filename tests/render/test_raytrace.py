@@ -4,10 +4,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vinl.render.chase_camera import ChaseCamera
-from vinl.render.raytrace import RayRenderer, look_at
-from vinl.render.robot_shape import RobotShape
-from vinl.render.scene import BLOCK, GOAL, plain_scene, plan_scene
+from vinl.render.raytrace import ChaseCamera, RayRenderer, look_at
+from vinl.render.scene import BLOCK, GOAL, RobotShape, plain_scene, plan_scene
 from vinl.robot.aliengo import home_qpos
 from vinl.world.boxes import Blocks, Boxes
 from vinl.world.grid import GridFrame

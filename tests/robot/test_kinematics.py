@@ -2,8 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from vinl.robot.aliengo import FOOT_GEOMS
-from vinl.robot.kinematics import foot_positions
+from vinl.robot.aliengo import FOOT_GEOMS, foot_positions
 from vinl.robot.model import robot_spec
 
 

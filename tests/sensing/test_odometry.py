@@ -7,7 +7,7 @@ import torch
 
 from vinl.config.errors import InputError
 from vinl.sensing.odometry import Odometry
-from vinl.sensing.odometry_config import OdometryConfig
+from vinl.sensing.sensor_config import OdometryConfig
 
 N = 4000
 

@@ -17,7 +17,7 @@ from vinl.policies.networks import PolicyNetwork, StepActor
 from vinl.policies.policy import LocomotionPolicy, Policy
 from vinl.policies.stepping_actor import SteppingActor
 from vinl.viewer.live import LiveChain
-from vinl.viewer.requests import (
+from vinl.viewer.session import (
     ChangePolicies,
     Drive,
     OpenPlan,
@@ -26,12 +26,12 @@ from vinl.viewer.requests import (
     Reset,
     ScatterClutter,
     Seek,
+    Session,
     SetGoal,
+    Snapshot,
     StepOnce,
     ToggleBlock,
 )
-from vinl.viewer.session import Session
-from vinl.viewer.snapshot import Snapshot
 from vinl.viewer.world import TOO_CLOSE, open_ground, open_home
 
 CONFIG = vinl.EvaluationConfig()

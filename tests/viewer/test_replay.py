@@ -10,8 +10,7 @@ from vinl.benchmark.journal import RECORDINGS, Recordings, find_recording, read_
 from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.viewer.replay import Replay
-from vinl.viewer.requests import OpenEpisode, Seek, SetGoal
-from vinl.viewer.session import Session
+from vinl.viewer.session import OpenEpisode, Seek, Session, SetGoal
 
 
 def test_recordings_are_small_and_hold_the_poses_of_the_walk(folder: Path):

@@ -11,9 +11,7 @@ import vinl
 from vinl.chain.workers import one_thread
 from vinl.config.errors import InputError
 from vinl.robot.aliengo import home_qpos
-from vinl.viewer.requests import Pause, Push, Request, Reset, SetPace, StepOnce
-from vinl.viewer.session import Session
-from vinl.viewer.snapshot import Snapshot
+from vinl.viewer.session import Pause, Push, Request, Reset, Session, SetPace, Snapshot, StepOnce
 from vinl.viewer.world import World, open_ground
 
 
@@ -124,7 +122,7 @@ def test_failure_of_the_source_ends_the_session_and_is_kept():
 def test_chain_with_both_policies_and_images_is_faster_than_real_time():
     """Processor time, so that what runs beside it does not count: less than the 20 ms that a control step lasts."""
     from vinl.viewer.live import LiveChain
-    from vinl.viewer.requests import SetGoal
+    from vinl.viewer.session import SetGoal
     from vinl.viewer.world import open_home
 
     config = vinl.EvaluationConfig()

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 import vinl
-from vinl.viewer.floor import cover_cells, inside_mesh
-from vinl.viewer.panel_text import render_status
-from vinl.viewer.requests import Drive, OpenPlan, ScatterClutter, SetGoal, ToggleBlock
-from vinl.viewer.scene_view import LAYERS
-from vinl.viewer.viewer import Viewer
+from vinl.viewer.scene_view import LAYERS, cover_cells, inside_mesh
+from vinl.viewer.session import Drive, OpenPlan, ScatterClutter, SetGoal, ToggleBlock
+from vinl.viewer.viewer import Viewer, render_status
 
 
 def wait_until_drawn(viewer: Viewer) -> None:

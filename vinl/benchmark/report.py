@@ -15,8 +15,7 @@ from vinl.chain.metrics import FAILURES, read_failure
 from vinl.chain.records import EpisodeRecord, Results
 from vinl.config.loader import load_config
 from vinl.config.output import describe_environment
-from vinl.render.drawing import POINT_DT, draw_histogram, draw_map
-from vinl.render.page import format_number, open_table, render_page
+from vinl.render.drawing import POINT_DT, draw_histogram, draw_map, format_number, open_table, render_page
 
 _SHOWN = ("vinl", "vinl_no_clutter", "rough")
 """Rows of the paper's table that every report shows."""

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from vinl.config.errors import InputError
 from vinl.config.limits import check_fields, check_number
 from vinl.robot.aliengo import PHYSICS_DT
-from vinl.sensing.odometry_config import OdometryConfig
-from vinl.sensing.sensor_config import SensorConfig
+from vinl.sensing.sensor_config import OdometryConfig, SensorConfig
 from vinl.world.endings import MAX_TILT
 
 

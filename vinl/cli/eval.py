@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vinl.cli.kinds import load_rules
-from vinl.cli.options import Settings, default_out, parse_options, settings_first
+from vinl.cli.options import Settings, default_out, load_rules, parse_options, settings_first
 from vinl.config.errors import InputError
 
 if TYPE_CHECKING:

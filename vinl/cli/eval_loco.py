@@ -136,7 +136,7 @@ def _run_bars(options: Options, names: list[str], out: Path, command: list[str])
 
     from vinl.cli.progress import Progress
     from vinl.config.output import write_json
-    from vinl.courses.bars import BarConfig
+    from vinl.courses.crossing import BarConfig
     from vinl.courses.evaluate_crossings import check_crossing_numbers, compare_crossings
     from vinl.courses.report import label_policies, picture_crossings, print_crossings, results_as_dict
 

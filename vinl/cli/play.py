@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from vinl.cli.kinds import load_rules
-from vinl.cli.options import Settings, parse_options, settings_first
+from vinl.cli.options import Settings, load_rules, parse_options, settings_first
 from vinl.config.errors import InputError
 
 if TYPE_CHECKING:

@@ -61,7 +61,7 @@ def main(argv: list[str]) -> int:
         row, what = played.wrong
         print(f"after {row * PHYSICS_DT * 1000:.0f} ms: {what}")
     if video is not None:
-        from vinl.render.state_film import film_state
+        from vinl.render.video import film_state
 
         if not np.isfinite(played.qpos[0]).all():
             raise InputError(f"{options.state}: the saved pose itself is not finite; there is nothing to film")

@@ -41,14 +41,14 @@ def main(argv: list[str]) -> int:
     device = choose_training_device(options.device)
     os.environ.setdefault("JAX_PLATFORMS", "cpu" if device == "cpu" else "cuda,cpu")
 
-    from vinl.rl.compile_cache import use_compile_cache
+    from vinl.rl.machine import use_compile_cache
 
     use_compile_cache()
-    from vinl.cli.kinds import check_config, check_run, check_source
+    from vinl.cli.options import check_config, check_run, check_source
     from vinl.config.output import check_out
     from vinl.loco.config import LocoConfig
+    from vinl.rl.machine import explain_out_of_memory
     from vinl.rl.nan_guard import NotFiniteError
-    from vinl.rl.out_of_memory import explain_out_of_memory
     from vinl.rl.run_folder import RunFolder
 
     if options.resume:

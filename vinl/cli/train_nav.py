@@ -43,10 +43,10 @@ def main(argv: list[str]) -> int:
         raise InputError(f"--memory must be positive, got {options.memory}")
     device = _choose_device(options)
 
-    from vinl.cli.kinds import check_config, check_run, check_source
+    from vinl.cli.options import check_config, check_run, check_source
     from vinl.config.output import check_out
     from vinl.nav.config import NavConfig
-    from vinl.rl.out_of_memory import explain_out_of_memory
+    from vinl.rl.machine import explain_out_of_memory
     from vinl.rl.run_folder import RunFolder
 
     if options.resume:

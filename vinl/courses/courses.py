@@ -12,9 +12,8 @@ from vinl.config.errors import InputError
 from vinl.config.loader import closest
 from vinl.courses.grounds import Ground
 from vinl.policies.policy import Policy
-from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, home_qpos
+from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, foot_positions, home_qpos
 from vinl.robot.commands import UNIFORM, CommandConfig, make_commands
-from vinl.robot.kinematics import foot_positions
 
 FOOT_CLEARANCE = 0.06
 """In litter, no foot stands with its middle nearer to an object than this [m]."""

@@ -17,9 +17,8 @@ from vinl.config.limits import check_number
 from vinl.courses.block_contacts import BINS, bin_heights
 from vinl.courses.courses import CommandRanges, Course, choose_commands, command_ranges
 from vinl.courses.grounds import DENSITY, Ground, GroundConfig, build_ground
-from vinl.courses.herd import BoxHerd
 from vinl.courses.robot_records import RobotRecord, aggregate_robots
-from vinl.courses.trial import run_trial
+from vinl.courses.trial import BoxHerd, run_trial
 from vinl.policies.identity import describe_policy
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT

@@ -15,11 +15,20 @@ from vinl.chain.workers import Context
 from vinl.config.errors import InputError
 from vinl.config.limits import check_number
 from vinl.config.output import round_numbers
-from vinl.courses.bars import APPROACH, SPREAD, WIDTH, BarConfig, build_corridor
-from vinl.courses.crossing import PATIENCE, CrossingRecord, CrossingTrace, cross_bar
+from vinl.courses.crossing import (
+    APPROACH,
+    PATIENCE,
+    SPREAD,
+    WIDTH,
+    BarConfig,
+    CrossingRecord,
+    CrossingTrace,
+    build_corridor,
+    cross_bar,
+)
 from vinl.courses.evaluate import Group, TrialResults, cut_groups, run_groups
-from vinl.courses.gait_metrics import aggregate_gait
 from vinl.courses.grounds import Ground
+from vinl.courses.robot_records import aggregate_gait
 from vinl.policies.identity import describe_policy
 from vinl.policies.policy import Policy
 

@@ -1,4 +1,5 @@
-"""The recorder of each robot of a locomotor's trial, and the figures of all of them with their 95 % intervals."""
+"""What is counted of each robot of a locomotor's trial: touches, steps of the feet, how it walks; and the figures of
+all of them with their 95 % intervals."""
 
 from __future__ import annotations
 
@@ -8,13 +9,105 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from vinl.chain.metrics import BOOTSTRAP, wilson_interval
 from vinl.config.output import round_numbers
-from vinl.courses.block_contacts import BINS, HEIGHT_EDGES
-from vinl.courses.gait_metrics import GaitRecord, aggregate_gait
-from vinl.robot.aliengo import CONTROL_DT
+from vinl.courses.block_contacts import BINS, HEIGHT_EDGES, Strain
+from vinl.robot.aliengo import CONTROL_DT, HIPS, MASS, foot_positions
+from vinl.robot.rotation import matrix_of
+
+GRAVITY = 9.81
+"""[m/s2]."""
+
+CLOSE = 0.06
+"""Middles of two feet nearer than this [m] are as good as a foot on a foot, whose radius is 0.0265 m."""
+
+_PAIRS = np.triu_indices(4, 1)
+
+
+@dataclass
+class GaitRecord:
+    """One robot's sums. ``*_steps`` count control steps of 0.02 s."""
+
+    steps: int = 0
+    work_j: float = 0.0
+    overspeed_steps: int = 0
+    """A joint was faster than the data sheet allows."""
+    joint_speed_peak: float = 0.0
+    """The fastest joint, as a fraction of what the data sheet allows."""
+    leg_leg_steps: int = 0
+    """A leg touched another."""
+    own_body_steps: int = 0
+    """A leg touched another, the trunk, or itself."""
+    feet_close_steps: int = 0
+    """The middles of two feet were nearer than 6 cm to each other."""
+    foot_distance_min: float | None = None
+    """The least distance between the middles of two feet [m]."""
+    foot_above_hip_steps: int = 0
+    """A foot was higher than its hip joint."""
+
+
+def record_gait(
+    records: Sequence[GaitRecord], strain: Strain, qpos: Float[np.ndarray, "n 19"], rows: Sequence[int] | None = None
+) -> None:
+    """Add one control step.
+
+    Args:
+        records: of all robots.
+        strain: of the control step.
+        qpos: where the robots are at its end.
+        rows: the robots to count; all by default.
+    """
+    feet = foot_positions(np, qpos)
+    hips = qpos[:, None, 2] + matrix_of(np, qpos[:, 3:7])[:, 2] @ HIPS.T
+    nearest = np.linalg.norm(feet[:, _PAIRS[0]] - feet[:, _PAIRS[1]], axis=-1).min(1)
+    above = (feet[..., 2] > hips).any(1)
+    for k in range(len(records)) if rows is None else rows:
+        record, gap = records[k], float(nearest[k])
+        record.steps += 1
+        record.work_j += float(strain.work[k])
+        record.overspeed_steps += int(strain.speed[k] > 1)
+        record.joint_speed_peak = max(record.joint_speed_peak, float(strain.speed[k]))
+        record.leg_leg_steps += int(strain.leg_leg[k])
+        record.own_body_steps += int(strain.own_body[k])
+        record.feet_close_steps += int(gap < CLOSE)
+        record.foot_distance_min = gap if record.foot_distance_min is None else min(record.foot_distance_min, gap)
+        record.foot_above_hip_steps += int(above[k])
+
+
+def aggregate_gait(records: Sequence[GaitRecord], metres: float) -> dict[str, Any]:
+    """The figures of all robots.
+
+    ``cost_of_transport`` is the joints' mechanical work over weight and way; ``leg_leg_per_m`` and ``own_body_per_m``
+    are control steps per metre; ``joint_overspeed``, ``feet_close`` and ``foot_above_hip`` are fractions of the control
+    steps.
+
+    Args:
+        records: of all robots.
+        metres: that they walked together.
+    """
+    steps = sum(r.steps for r in records)
+    if not steps:
+        return {}
+
+    def total(name: str) -> float:
+        return float(sum(getattr(r, name) for r in records))
+
+    def over(name: str, by: float) -> float | None:
+        return total(name) / by if by > 0 else None
+
+    return {
+        "cost_of_transport": over("work_j", MASS * GRAVITY * metres),
+        "leg_leg_per_m": over("leg_leg_steps", metres),
+        "own_body_per_m": over("own_body_steps", metres),
+        "joint_overspeed": over("overspeed_steps", steps),
+        "joint_speed_peak": max(r.joint_speed_peak for r in records),
+        "feet_close": over("feet_close_steps", steps),
+        "foot_distance_min": min(r.foot_distance_min for r in records if r.foot_distance_min is not None),
+        "foot_above_hip": over("foot_above_hip_steps", steps),
+    }
+
 
 HEIGHT_NAMES = tuple(f"{a:.2f}-{b:.2f}" for a, b in pairwise(HEIGHT_EDGES))
 """Names of the bins of block height [m]."""
@@ -141,3 +234,71 @@ def _columns(records: Sequence[RobotRecord]) -> dict[str, Float[np.ndarray, " n"
     ):
         named[name] = np.array([get(r) for r in records], np.float64)
     return named
+
+
+_STEADY = 2
+"""A foot has lifted off, or come down, when it was so for this many control steps in a row."""
+
+
+class StepCounter:
+    """Counts the steps of n robots, and the dirty ones.
+
+    A step is one swing of a foot and the stance after it, from one lift-off to the next. It is dirty if, meanwhile,
+    this foot or its leg (hip, thigh, shank) touched an object. A foot that is stopped by an object for two control
+    steps or more and then lifted again has made two steps.
+
+    Attributes:
+        steps: (n,) completed steps.
+        dirty: (n,) those in which the foot or its leg touched an object.
+        dirty_foot: (n,) those in which the foot did.
+    """
+
+    def __init__(self, n: int) -> None:
+        self.steps, self.dirty, self.dirty_foot = (np.zeros(n, int) for _ in range(3))
+        self._down, self._changing = np.ones((n, 4), bool), np.zeros((n, 4), int)
+        self._open = np.zeros((n, 4), bool)
+        self._touched, self._lifting = np.zeros((2, n, 4), bool), np.zeros((2, n, 4), bool)  # by foot, by leg
+
+    def add(
+        self,
+        stance: Bool[np.ndarray, "n 4"],
+        feet: Bool[np.ndarray, "n 4"],
+        legs: Bool[np.ndarray, "n 4"],
+        counted: Bool[np.ndarray, " n"],
+    ) -> None:
+        """One control step of all robots.
+
+        Args:
+            stance: which feet carry, on whatever.
+            feet, legs: which of them touch an object.
+            counted: whose steps count that begin now.
+        """
+        self._changing = np.where(stance == self._down, 0, self._changing + 1)
+        # touches of a lift-off belong to the new step, as soon as it is one
+        lifting, touches = self._down & (self._changing > 0), np.stack([feet, legs])
+        self._touched |= (touches | self._lifting) & ~lifting
+        self._lifting = (touches | self._lifting) & lifting
+        changed = self._changing >= _STEADY
+        lifted = changed & self._down
+        self._close(lifted)
+        self._touched[:, lifted] = self._lifting[:, lifted]
+        self._open |= lifted & counted[:, None]
+        self._changing[changed], self._lifting[:, changed] = 0, False
+        self._down ^= changed
+
+    def restart(self, which: Bool[np.ndarray, " n"], fallen: Bool[np.ndarray, " n"]) -> None:
+        """Some robots stand anew. Steps that they had begun are dropped, those in which they fell count."""
+        rows = np.broadcast_to(which[:, None], self._open.shape)
+        self._close(rows & fallen[:, None])
+        self._open[which], self._touched[:, which], self._lifting[:, which] = False, False, False
+        self._down[which], self._changing[which] = True, 0
+
+    def _close(self, ended: Bool[np.ndarray, "n 4"]) -> None:
+        done = self._open & ended
+        for counts, flags in (
+            (self.steps, done),
+            (self.dirty, done & self._touched.any(0)),
+            (self.dirty_foot, done & self._touched[0]),
+        ):
+            counts += flags.sum(1)
+        self._open[ended], self._touched[:, ended] = False, False

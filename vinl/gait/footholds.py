@@ -23,8 +23,7 @@ from vinl.gait.state import (
     swings,
     turn,
 )
-from vinl.robot.aliengo import FOOT_RADIUS
-from vinl.robot.kinematics import HIPS
+from vinl.robot.aliengo import FOOT_RADIUS, HIPS
 
 ALONG = np.arange(-6, 7) * 0.055
 """(13,) offsets of candidates from Raibert's foothold, along the heading [m]."""

@@ -12,8 +12,7 @@ from vinl.gait.ground_view import FieldView, build_ground_map
 from vinl.gait.leg import knee_from_foot
 from vinl.gait.path import swing_path
 from vinl.gait.state import aim, stance_places, start_gait, swings, tick
-from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS
-from vinl.robot.kinematics import HIPS
+from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS, HIPS
 from vinl.world.boxes import Boxes
 from vinl.world.grid import BLOCK, GridFrame, flat_field, raise_boxes
 

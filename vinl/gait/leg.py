@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from vinl.robot.kinematics import LINK
+from vinl.robot.aliengo import LINK
 
 REACH = 0.48
 """Longest way from hip to foot that a foothold may ask for [m]; 0.5 is a straight leg, 0.488 the calf's limit."""

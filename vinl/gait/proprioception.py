@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from vinl.gait.arrays import constant
-from vinl.robot.aliengo import CONTROL_DT
-from vinl.robot.kinematics import HIPS, LINK, THIGH_ASIDE
+from vinl.robot.aliengo import CONTROL_DT, HIPS, LINK, THIGH_ASIDE
 
 
 def feet_in_trunk(xp: Any, joints: Any) -> Any:

@@ -14,8 +14,7 @@ from jaxtyping import Float
 from vinl.gait.arrays import constant
 from vinl.gait.clock import OFFSETS, follow_period, is_moving, swing_fraction, wanted_period
 from vinl.gait.config import GaitConfig
-from vinl.robot.aliengo import CONTROL_DT
-from vinl.robot.kinematics import LINK, foot_positions, knee_positions
+from vinl.robot.aliengo import CONTROL_DT, LINK, foot_positions, knee_positions
 from vinl.robot.rotation import wrap_angle, yaw_of
 
 START_PHASE = 0.95

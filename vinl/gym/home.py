@@ -19,10 +19,8 @@ from vinl.chain.records import plain_record
 from vinl.chain.workers import one_thread
 from vinl.config.errors import InputError
 from vinl.config.loader import closest, load_config
-from vinl.gym.chase import ChaseView
-from vinl.gym.drivers import Guide, Legs
 from vinl.gym.observations import AgentObservation, Cameras, choose_cameras
-from vinl.gym.trip import Trip
+from vinl.gym.trip import ChaseView, Guide, Legs, Trip
 from vinl.nav.config import NavConfig
 from vinl.policies.card import navigation_table
 from vinl.policies.policy import Policy

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-import numpy as np
-from jaxtyping import Float
+from pathlib import Path
 
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from vinl.chain.batching import batch_navigator, batch_policy
+from vinl.chain.choose import load_navigator
 from vinl.chain.config import EvaluationConfig
+from vinl.chain.controller import open_controller
+from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.chain.episode import EpisodeSetup, Recorder
 from vinl.chain.metrics import tracking_errors
-from vinl.chain.navigators.base import Task, goal_in_heading_frame
+from vinl.chain.navigators.base import Navigator, Task, decide, goal_in_heading_frame
 from vinl.chain.records import Episode
 from vinl.chain.robot import KINDS, Robot
 from vinl.chain.scene import build_scene
+from vinl.policies.policy import Policy
+from vinl.render.raytrace import ChaseCamera, RayRenderer
+from vinl.render.scene import RobotShape, plan_scene
 from vinl.robot.aliengo import CONTROL_DT, KD, KP
 from vinl.robot.rotation import yaw_of
 from vinl.world.free_space import FreeSpace, distance_field, read_field
@@ -110,3 +119,75 @@ class Trip:
     def _end(self, reason: str) -> None:
         self.end = reason
         self._recorder.end(reason)
+
+
+SIZE = (640, 480)
+"""Width and height [pixels]."""
+
+_FILM_DT = 0.08
+"""The camera's smoothing is tuned to pictures so far apart [s]."""
+
+
+class ChaseView:
+    """The robot of an episode from behind and above.
+
+    Args:
+        trip: the episode.
+        period: time between two pictures [s].
+    """
+
+    def __init__(self, trip: Trip, period: float) -> None:
+        goal = trip.setup.route.goal
+        self._shape = RobotShape()
+        scene = plan_scene(trip.task.space.plan, trip.setup.blocks, goal=(float(goal[0]), float(goal[1])))
+        self._renderer = RayRenderer(scene, self._shape.bodies, self._shape.names)
+        self._camera = ChaseCamera(self._renderer, smoothing=1.0 - 0.92 ** (period / _FILM_DT))
+
+    def draw(self, trip: Trip) -> UInt8[np.ndarray, "height width 3"]:
+        """The picture of this moment."""
+        qpos, pose = trip.qpos[0], trip.pose[0]
+        return self._renderer.render(self._camera.follow(qpos[:3], float(pose[2])), *SIZE, *self._shape.place(qpos))
+
+
+class Legs:
+    """A locomotor that carries out velocities.
+
+    Attributes:
+        gains: kp [N m / rad] and kd [N m s / rad] that it was trained with.
+    """
+
+    def __init__(self, policy: Policy) -> None:
+        self._policy = batch_policy(policy)
+        self.gains = float(policy.card.action["kp"]), float(policy.card.action["kd"])
+
+    def enter(self, trip: Trip, ceiling: float | None) -> None:
+        """A new episode begins."""
+        self._controller = open_controller(self._policy, trip.task.space.plan, [trip.setup.blocks], ceiling)
+        self._controller.reset(1)
+
+    def choose(self, trip: Trip, command: Float[np.ndarray, "1 3"]) -> Float[np.ndarray, "12"]:
+        """Joint targets [rad] of the next control step."""
+        return self._controller.step(trip.qpos, trip.qvel, command, [0])[0]
+
+
+class Guide:
+    """A navigator that chooses the velocities, see ``Navigator``."""
+
+    def __init__(self, navigator: str | Path | Navigator, rules: EvaluationConfig) -> None:
+        by_name = isinstance(navigator, (str, Path))
+        self._navigator = batch_navigator(load_navigator(navigator, rules) if by_name else navigator)
+        self._cameras: DepthCameras | None = None
+
+    def enter(self, trip: Trip, ceiling: float | None) -> None:
+        """A new episode begins."""
+        self._navigator.reset([trip.task])
+        self._last = np.zeros((1, 2))
+        camera = self._navigator.camera
+        plan, blocks = trip.task.space.plan, [trip.setup.blocks]
+        self._cameras = None if camera is None else open_depth_cameras(plan, blocks, camera, ceiling)
+
+    def choose(self, trip: Trip) -> Float[np.ndarray, "2"]:
+        """Forward speed [m/s] and yaw rate [rad/s] of the next half second."""
+        depth = None if self._cameras is None else self._cameras.look(trip.qpos, [0])
+        self._last = decide(self._navigator, trip.setup.route.goal[None], self._last, trip.pose, depth=depth)
+        return self._last[0]

@@ -27,8 +27,7 @@ from vinl.gait.state import (
 )
 from vinl.loco.rewards import MIDDLE
 from vinl.loco.simulation import SHANK_REACH, Body, DeviceGround
-from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS
-from vinl.robot.kinematics import HIPS
+from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS, HIPS
 from vinl.robot.rotation import rotate_inverse
 from vinl.world.grid import GridFrame
 

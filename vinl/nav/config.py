@@ -10,8 +10,7 @@ from vinl.config.errors import InputError
 from vinl.config.limits import Range, check_fields, check_number, check_range
 from vinl.policies.card import PREVIOUS
 from vinl.robot.cameras import NAVIGATION_CAMERA, Camera
-from vinl.sensing.odometry_config import OdometryConfig
-from vinl.sensing.sensor_config import SensorConfig
+from vinl.sensing.sensor_config import OdometryConfig, SensorConfig
 from vinl.world.homes.config import HomeConfig, layout_config
 
 Pair = tuple[float, float]

@@ -29,8 +29,7 @@ from vinl.policies.card import PolicyCard, find_previous
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.policies.velocity_range import VelocityRange
-from vinl.sensing.odometry_config import OdometryConfig
-from vinl.sensing.sensor_config import load_sensors
+from vinl.sensing.sensor_config import OdometryConfig, load_sensors
 from vinl.world.endings import END_REASONS as ALL_REASONS
 from vinl.world.endings import FALL, SUCCESS, name_late_end
 from vinl.world.free_space import FreeSpace

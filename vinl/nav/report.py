@@ -11,8 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from vinl.chain.metrics import summarise
-from vinl.render.drawing import draw_histogram, outline_boxes, outline_path
-from vinl.render.page import open_table, render_page
+from vinl.render.drawing import draw_histogram, open_table, outline_boxes, outline_path, render_page
 from vinl.robot.aliengo import LENGTH
 from vinl.world.boxes import Blocks, Boxes
 from vinl.world.endings import SUCCESS

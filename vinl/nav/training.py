@@ -25,8 +25,7 @@ from vinl.policies.io import save_policy
 from vinl.policies.lineage import find_commit, trace_lineage
 from vinl.policies.nav_actor import NavActor
 from vinl.rl.learning_rate import DeviceRate
-from vinl.rl.parallel import Peers, join_peers
-from vinl.rl.peer_loop import PeerLoop, peer_folder
+from vinl.rl.parallel import PeerLoop, Peers, join_peers, peer_folder
 from vinl.rl.run_folder import RunFolder
 from vinl.world.homes.generate import RESERVED_FROM
 

@@ -15,8 +15,7 @@ from vinl.config.loader import load_config
 from vinl.policies.device import choose_training_device
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
-from vinl.rl.compile_cache import use_compile_cache
-from vinl.rl.out_of_memory import explain_out_of_memory
+from vinl.rl.machine import explain_out_of_memory, use_compile_cache
 
 
 @dataclass(frozen=True)

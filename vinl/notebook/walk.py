@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import html
+import shutil
+import tempfile
+import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
@@ -21,10 +25,11 @@ from vinl.chain.rollout import run_episodes
 from vinl.chain.workers import one_thread, show_line
 from vinl.config.errors import InputError
 from vinl.config.loader import closest
+from vinl.config.output import check_out
 from vinl.notebook.plans import draw_plan, embed_image, open_plan
 from vinl.policies.policy import Policy
 from vinl.render.panels import colour_depth
-from vinl.render.video import POSE_DT
+from vinl.render.video import POSE_DT, FilmJob, film
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
 from vinl.world.boxes import Blocks
@@ -173,3 +178,71 @@ def walk(
         done = run_episodes(home, [setup], legs, guide, rules, filmed=(0,), is_stopped=note)[0]
     seen = {"locomotion": legs.camera, "navigation": guide.camera}
     return Walk(home, route, done, rules, {name: camera or _STANDARD[name] for name, camera in seen.items()})
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film: show it as the last line of a cell, or open the file.
+
+    Attributes:
+        path: the MP4.
+        width: in the notebook [pixels].
+    """
+
+    path: Path
+    width: int = 800
+
+    def __repr__(self) -> str:
+        return f"Film({self.path.name})"
+
+    def _repr_html_(self) -> str:
+        """A player with the film inside: the notebook needs no file."""
+        data = base64.b64encode(self.path.read_bytes()).decode()
+        return f'<video controls width="{self.width}" src="data:video/mp4;base64,{data}"></video>'
+
+
+def show_video(
+    walk: Walk, start: float = 0.0, stop: float | None = None, out: str | Path | None = None, width: int = 800
+) -> Film:
+    """The film of a walk: the robot, what its cameras see, the map. About 0.1 s a picture, 12.5 pictures a second.
+
+    Args:
+        walk: the episode.
+        start, stop: show this part [s]; all of it by default. The clock of the film begins with it.
+        out: folder for the file; a temporary one by default, which is gone with the film.
+        width: in the notebook [pixels].
+
+    Raises:
+        InputError: start and stop leave nothing to show, it is no walk, or the folder cannot be written to.
+    """
+    if not isinstance(walk, Walk):
+        raise InputError(f"show_video shows what vinl.walk returns, got {type(walk).__name__}")
+    if isinstance(start, (str, Path)):
+        raise InputError(f"show_video(walk, start, stop): start is a time [s], got {start!r}; a folder is out=...")
+    part = cut_episode(walk.episode, start, stop)
+    folder = Path(tempfile.mkdtemp(prefix="vinl-film-")) if out is None else check_out(out)
+    shown = Film(folder / film(FilmJob(walk.plan, part, str(folder)), walk.config), width)
+    if out is None:
+        weakref.finalize(shown, shutil.rmtree, folder, ignore_errors=True)
+    return shown
+
+
+def cut_episode(episode: Episode, start: float, stop: float | None) -> Episode:
+    """The part of an episode from ``start`` to ``stop`` [s], as a film needs it.
+
+    Raises:
+        InputError: no pose lies between them.
+    """
+    trace, record = episode.trace, episode.record
+    first, last = round(start / POSE_DT), len(trace.poses) if stop is None else round(stop / POSE_DT)
+    if not 0 <= first < min(last, len(trace.poses)):
+        raise InputError(f"nothing to show from {start:g} s to {stop or record.time_s:g} s of {record.time_s:g} s")
+    end = record.time_s if stop is None else min(stop, record.time_s)
+    kept = trace.contacts[(trace.contacts[:, 0] >= start) & (trace.contacts[:, 0] <= end)]
+    part = replace(
+        trace,
+        poses=trace.poses[first:last],
+        commands=trace.commands[first:last],
+        contacts=kept - [first * POSE_DT, 0, 0, 0],
+    )
+    return Episode(record if end == record.time_s else replace(record, end_reason=""), part)

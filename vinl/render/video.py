@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -13,19 +14,18 @@ from jaxtyping import Float, UInt8
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.records import Episode
 from vinl.chain.rollout import InterruptedRunError
-from vinl.render.chase_camera import ChaseCamera
-from vinl.render.film_file import write_film
+from vinl.render.film_file import write_caption, write_film
 from vinl.render.panels import MapPanel, colour_depth, compose
-from vinl.render.raytrace import RayRenderer
-from vinl.render.robot_shape import RobotShape
-from vinl.render.scene import plan_scene
+from vinl.render.raytrace import ChaseCamera, RayRenderer, look_at
+from vinl.render.scene import BLOCK, FLOOR, WALL, RobotShape, Scene, plan_scene
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
 from vinl.robot.rotation import matrix_of, yaw_of
 from vinl.sensing.depth import DepthCamera
 from vinl.world.boxes import Blocks
 from vinl.world.floorplan import FloorPlan
-from vinl.world.mesh import floorplan_mesh
+from vinl.world.grid import GridFrame, HeightField
+from vinl.world.mesh import floorplan_mesh, heightfield_mesh
 
 POSE_DT = 2 * CONTROL_DT
 """Time between two recorded poses [s]."""
@@ -133,3 +133,60 @@ def _speeds(poses: np.ndarray, yaw: np.ndarray) -> np.ndarray:
 def _count_steps(contacts: np.ndarray, kinds: tuple[int, ...]) -> int:
     """Control steps with a contact of one of the kinds."""
     return len(np.unique(contacts[np.isin(contacts[:, 1], kinds), 0]))
+
+
+SIZE = (640, 480)
+"""Width and height [pixels]."""
+
+RATE = 10
+"""Pictures a second."""
+
+_REACH = 2.5
+_SQUARE = 5
+_LAST = RATE  # the last picture stays for a second
+_NOWHERE = GridFrame(1000.0, 1000.0, 1.0, (2, 2))
+_COLOURS = np.array([FLOOR, BLOCK, WALL])
+
+
+def film_state(poses: Float[np.ndarray, "t 19"], texts: list[str], field: HeightField, path: Path) -> None:
+    """Film the poses one after another; from the first that is not finite on, the film stands still.
+
+    Args:
+        poses: (t, 19) position [m] and quaternion of the trunk, joint angles [rad]; the first is finite.
+        texts: one for every pose.
+        field: the ground.
+        path: ``.mp4`` or ``.gif``.
+    """
+    write_film(draw_state_frames(poses, texts, field), path, RATE)
+
+
+def draw_state_frames(
+    poses: Float[np.ndarray, "t 19"], texts: list[str], field: HeightField
+) -> Iterator[UInt8[np.ndarray, "height width 3"]]:
+    """The pictures."""
+    shape, middle = RobotShape(), poses[0, :3]
+    renderer = RayRenderer(_cut_scene(field, middle[:2]), shape.bodies, shape.names)
+    view = look_at(middle + np.array([1.1, -1.5, 0.7]), middle - np.array([0.0, 0.0, 0.1]))
+    pose = poses[0]
+    for k in range(len(poses) + _LAST):
+        row = min(k, len(poses) - 1)
+        seen = np.isfinite(poses[row]).all() and np.abs(poses[row, :3] - middle).max() < 20
+        pose = poses[row] if seen else pose
+        frame = renderer.render(view, *SIZE, *shape.place(pose), hfov=math.radians(52))
+        yield write_caption(frame, texts[row])
+
+
+def _cut_scene(field: HeightField, middle: Float[np.ndarray, " 2"]) -> Scene:
+    """The ground around a point, in squares of 0.25 m; blocks and walls have colours of their own."""
+    f, reach = field.frame, round(_REACH / field.frame.resolution)
+    row, column = (int(x) for x in f.cell(middle))
+    i = slice(max(row - reach, 0), min(row + reach + 1, f.shape[0]))
+    j = slice(max(column - reach, 0), min(column + reach + 1, f.shape[1]))
+    heights, labels = field.heights[i, j], field.labels[i, j]
+    x, y = f.xy(np.array([i.start, j.start]))
+    vertices, faces = heightfield_mesh(heights, GridFrame(float(x), float(y), f.resolution, heights.shape))
+    label = np.maximum.reduce([labels[:-1, :-1], labels[1:, :-1], labels[:-1, 1:], labels[1:, 1:]])
+    squares = np.add.outer(np.arange(label.shape[0]) // _SQUARE, np.arange(label.shape[1]) // _SQUARE) % 2
+    colours = _COLOURS[label] * (1 - 0.12 * squares[..., None])
+    painted = np.repeat(colours.reshape(-1, 3), 2, axis=0).astype(np.float32)  # two triangles a cell
+    return Scene(vertices, faces, painted, _NOWHERE)

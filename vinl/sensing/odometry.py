@@ -9,7 +9,7 @@ import warp as wp
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from vinl.sensing.odometry_config import OdometryConfig
+from vinl.sensing.sensor_config import OdometryConfig
 from vinl.sensing.sensor_kernels import draw_uniform
 
 

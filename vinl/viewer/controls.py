@@ -12,7 +12,8 @@ import viser
 
 from vinl.chain.navigators.base import Navigator
 from vinl.policies.policy import Policy
-from vinl.viewer.requests import (
+from vinl.viewer.session import (
+    PACES,
     ChangePolicies,
     Drive,
     OpenEpisode,
@@ -26,11 +27,10 @@ from vinl.viewer.requests import (
     Seek,
     SetGoal,
     SetPace,
+    Snapshot,
     StepOnce,
     ToggleBlock,
 )
-from vinl.viewer.session import PACES
-from vinl.viewer.snapshot import Snapshot
 from vinl.world.clutter import CLUTTER
 
 FORWARD, TURN = (-0.3, 1.0), 60.0

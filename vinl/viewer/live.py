@@ -25,9 +25,11 @@ from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, FOOT_GEOMS
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
 from vinl.robot.rotation import yaw_of
-from vinl.viewer.requests import (
+from vinl.viewer.session import (
     ChangePolicies,
+    DepthImage,
     Drive,
+    Footholds,
     OpenPlan,
     PlaceRobot,
     Push,
@@ -35,9 +37,9 @@ from vinl.viewer.requests import (
     Reset,
     ScatterClutter,
     SetGoal,
+    Snapshot,
     ToggleBlock,
 )
-from vinl.viewer.snapshot import DepthImage, Footholds, Snapshot
 from vinl.viewer.world import World, draw_block, open_home
 from vinl.world.free_space import FreeSpace
 from vinl.world.readers import load_floorplan

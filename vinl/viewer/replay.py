@@ -19,8 +19,7 @@ from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
 from vinl.robot.model import robot_spec
 from vinl.robot.rotation import wrap_angle, yaw_of
 from vinl.viewer.live import CONTACT_MEMORY
-from vinl.viewer.requests import OpenEpisode, Request, Reset, Seek
-from vinl.viewer.snapshot import DepthImage, Snapshot
+from vinl.viewer.session import DepthImage, OpenEpisode, Request, Reset, Seek, Snapshot
 from vinl.viewer.world import World
 from vinl.world.boxes import Blocks
 from vinl.world.floorplan import FloorPlan

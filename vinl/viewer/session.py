@@ -1,4 +1,5 @@
-"""A session: a source that is stepped at the pace of time in a thread of its own, asked for things through a queue."""
+"""A session: a source that is stepped at the pace of time in a thread of its own, asked for things through a queue of
+plain records; what it shows of one moment is a snapshot, which never changes afterwards."""
 
 from __future__ import annotations
 
@@ -6,14 +7,217 @@ import queue
 import threading
 import time
 from collections import deque
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
+import numpy as np
 import torch
+from jaxtyping import Float
 
+from vinl.chain.navigators.base import Navigator
 from vinl.config.errors import InputError
-from vinl.viewer.requests import Pause, Request, Reset, Seek, SetPace, StepOnce
-from vinl.viewer.snapshot import Snapshot
+from vinl.policies.policy import Policy
+from vinl.robot.cameras import Camera
+from vinl.viewer.world import World
+
+
+@dataclass(frozen=True)
+class Pause:
+    """Stop time, or let it go on."""
+
+    paused: bool
+
+
+@dataclass(frozen=True)
+class StepOnce:
+    """One step of the source (20 ms when live), then pause."""
+
+
+@dataclass(frozen=True)
+class SetPace:
+    """How fast time goes: 1 is real time, 0.1 a tenth of it."""
+
+    pace: float
+
+
+@dataclass(frozen=True)
+class Reset:
+    """Put the robot back to where it was last put down."""
+
+
+@dataclass(frozen=True)
+class SetGoal:
+    """Walk to a point [m] with the navigator."""
+
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Walk with this command: forward [m/s], yaw rate [rad/s], left positive. Ends a walk to a goal."""
+
+    forward: float
+    turn: float
+
+
+@dataclass(frozen=True)
+class Push:
+    """Change the trunk's velocity at once by so much [m/s], towards an angle from its heading [rad]."""
+
+    speed: float
+    angle: float
+
+
+@dataclass(frozen=True)
+class PlaceRobot:
+    """Put the robot down at x, y [m], with its heading."""
+
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class ToggleBlock:
+    """Take away the block at a point [m]; where there is none, put one down."""
+
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class ScatterClutter:
+    """Draw the clutter anew from a preset; ``none`` clears the floor."""
+
+    preset: str
+
+
+@dataclass(frozen=True)
+class ChangePolicies:
+    """Other policies, or their names or folders; None keeps the one there is."""
+
+    locomotion: str | Path | Policy | None = None
+    navigation: str | Path | Navigator | None = None
+
+
+@dataclass(frozen=True)
+class OpenPlan:
+    """Another floor plan, by name or file."""
+
+    plan: str
+
+
+@dataclass(frozen=True)
+class Seek:
+    """Go to a time of a recording [s]."""
+
+    time: float
+
+
+@dataclass(frozen=True)
+class OpenEpisode:
+    """Show another episode of the folder."""
+
+    number: int
+
+
+Request = (
+    Pause
+    | StepOnce
+    | SetPace
+    | Reset
+    | SetGoal
+    | Drive
+    | Push
+    | PlaceRobot
+    | ToggleBlock
+    | ScatterClutter
+    | ChangePolicies
+    | OpenPlan
+    | Seek
+    | OpenEpisode
+)
+"""Any of them."""
+
+
+STATES = ("standing", "walking", "driven", "reached", "fallen", "recorded")
+"""What the robot is about."""
+
+
+@dataclass(frozen=True, eq=False)
+class DepthImage:
+    """What a depth camera sees: (height, width) [m], and the camera."""
+
+    camera: Camera
+    depth: Float[np.ndarray, "height width"]
+
+
+@dataclass(frozen=True, eq=False)
+class Footholds:
+    """Where the feet are to come down, in the world frame; legs in the order of ``LEGS``.
+
+    Attributes:
+        planned: (4, 3) chosen on the map of the ground [m]; None: the controller plans none.
+        predicted: (4, 3) read from depth images by the policy [m]; None: it predicts none.
+    """
+
+    planned: Float[np.ndarray, "4 3"] | None = None
+    predicted: Float[np.ndarray, "4 3"] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """One moment of a session.
+
+    Attributes:
+        world: plan and clutter; another object when one of them changed.
+        time_s: since the robot was last put down, or of a recording [s].
+        state: one of ``STATES``.
+        qpos: (19,) generalised position.
+        velocity: (3,) forward, left [m/s], yaw rate [rad/s] in the heading frame.
+        command: (3,) the same as commanded.
+        goal: (2,) where it shall go [m], or None.
+        path: (k, 2) where the trunk has been, every 0.1 s [m].
+        distance_m: length of that [m].
+        contacts: (m, 5) the latest contacts with blocks, walls and furniture: time [s], index into ``contact.KINDS``,
+            x, y, z [m].
+        contact_steps: control steps with a contact of a foot, of a leg, of the trunk.
+        feet: (4, 3) middles of the feet [m].
+        foot_forces: (4,) size of the net contact force on each foot [N].
+        images: what the depth cameras saw last, by name.
+        footholds: where the feet are to come down.
+        duration_s: of a recording [s]; None: it is live.
+        paused: whether time stands still.
+        pace: wanted speed of time, 1 is real time.
+        real_time: speed of time as measured over the last second.
+        step_ms: what a control step cost on average over the last second [ms].
+        notice: number and text of the latest thing that the session has to say.
+    """
+
+    world: World
+    time_s: float
+    state: str
+    qpos: Float[np.ndarray, "19"]
+    velocity: Float[np.ndarray, "3"]
+    command: Float[np.ndarray, "3"]
+    goal: Float[np.ndarray, "2"] | None
+    path: Float[np.ndarray, "k 2"]
+    distance_m: float
+    contacts: Float[np.ndarray, "m 5"]
+    contact_steps: tuple[int, int, int]
+    feet: Float[np.ndarray, "4 3"]
+    foot_forces: Float[np.ndarray, "4"]
+    images: Mapping[str, DepthImage]
+    footholds: Footholds = field(default_factory=Footholds)
+    duration_s: float | None = None
+    paused: bool = False
+    pace: float = 1.0
+    real_time: float = 0.0
+    step_ms: float = 0.0
+    notice: tuple[int, str] = (0, "")
+
 
 PACES = (0.05, 4.0)
 """Slowest and fastest pace of time; 1 is real time."""

@@ -11,7 +11,7 @@ from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_routes, draw_setup
 from vinl.config.errors import InputError
 from vinl.config.loader import closest
-from vinl.courses.bars import WIDTH
+from vinl.courses.crossing import WIDTH
 from vinl.courses.grounds import DENSITY, GroundConfig, build_ground
 from vinl.robot.aliengo import DEFAULT_POSE, KD, KP, LENGTH
 from vinl.world.boxes import Blocks, Boxes

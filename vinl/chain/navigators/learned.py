@@ -18,7 +18,7 @@ from vinl.policies.velocity_range import VelocityRange
 from vinl.robot.cameras import Camera
 from vinl.robot.rotation import wrap_angle
 from vinl.sensing.odometry import Odometry
-from vinl.sensing.odometry_config import OdometryConfig
+from vinl.sensing.sensor_config import OdometryConfig
 
 
 def measure_twist(
