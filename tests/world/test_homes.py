@@ -24,7 +24,8 @@ SEEDS = st.integers(0, 100_000)
 
 
 def draw(seed: int, config: HomeConfig | None = None) -> tuple[Random, Shell]:
-    return draw_shell(seed, config or HomeConfig())
+    rng = Random(seed)
+    return rng, draw_shell(rng, config or HomeConfig())
 
 
 @settings(max_examples=20, deadline=None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -15,7 +16,23 @@ from vinl.config.errors import InputError
 
 
 @dataclass(frozen=True)
-class LocoOptions:
+class _Printed:
+    """Options of every benchmark."""
+
+    json: bool = False
+    """Print JSON instead of a table."""
+
+
+@dataclass(frozen=True)
+class _Measured(_Printed):
+    """Options of what is measured on a device."""
+
+    device: str = "auto"
+    """cpu, cuda, or auto: cuda where there is one."""
+
+
+@dataclass(frozen=True)
+class LocoOptions(_Measured):
     """Control steps per second of the training environment (MJX), with height scan and contact."""
 
     overrides: Settings = ()
@@ -26,14 +43,10 @@ class LocoOptions:
     """How long to measure, after compiling and warming up [s]."""
     config: str = "loco/rough"
     """Name of a shipped config or a YAML file."""
-    device: str = "auto"
-    """cpu, cuda, or auto: cuda where there is one."""
-    json: bool = False
-    """Print JSON instead of a table."""
 
 
 @dataclass(frozen=True)
-class DepthOptions:
+class DepthOptions(_Measured):
     """Depth images per second over house meshes, and the fraction of a bare ray kernel's speed."""
 
     num_images: int | None = None
@@ -46,14 +59,10 @@ class DepthOptions:
     """Homes that the images are spread over."""
     seconds: float = 2.0
     """How long to measure [s]."""
-    device: str = "auto"
-    """cpu, cuda, or auto: cuda where there is one."""
-    json: bool = False
-    """Print JSON instead of a table."""
 
 
 @dataclass(frozen=True)
-class NavOptions:
+class NavOptions(_Measured):
     """Steps per second of the navigation environment with a depth image each, and what its homes cost."""
 
     overrides: Settings = ()
@@ -68,14 +77,10 @@ class NavOptions:
     """Name of a shipped config or a YAML file."""
     tree: Literal["auto", "sah", "lbvh"] = "auto"
     """How the ray trees of the homes are built: sah on the host, lbvh on a GPU; auto is Warp's choice."""
-    device: str = "auto"
-    """cpu, cuda, or auto: cuda where there is one."""
-    json: bool = False
-    """Print JSON instead of a table."""
 
 
 @dataclass(frozen=True)
-class MemoryOptions:
+class MemoryOptions(_Printed):
     """GPU memory that a training of the navigation policy takes, predicted without a GPU [GB]: an upper estimate, as a
     compiled network keeps less for its backward pass."""
 
@@ -83,8 +88,6 @@ class MemoryOptions:
     """Settings of the config as key=value, such as num_envs=512 ppo.minibatches=16 homes.count=2000."""
     config: str = "nav/default"
     """Name of a shipped config or a YAML file."""
-    json: bool = False
-    """Print JSON instead of a table."""
 
 
 def main(argv: list[str]) -> int:
@@ -93,27 +96,25 @@ def main(argv: list[str]) -> int:
     if what in ("-h", "--help"):
         print("usage: vinl bench loco|nav|depth|memory [OPTIONS]\n\nvinl bench loco --help and so on list them.")
         return 0
-    if what == "loco":
-        options = parse_options(LocoOptions, settings_first(LocoOptions, argv[1:]), "bench loco")
-        figures = _bench_loco(options)
-    elif what == "depth":
-        options = parse_options(DepthOptions, argv[1:], "bench depth")
-        figures = _bench_depth(options)
-    elif what == "nav":
-        options = parse_options(NavOptions, settings_first(NavOptions, argv[1:]), "bench nav")
-        figures = _bench_nav(options)
-    elif what == "memory":
-        options = parse_options(MemoryOptions, settings_first(MemoryOptions, argv[1:]), "bench memory")
-        figures = _predict_memory(options)
-    else:
+    if what not in _BENCHMARKS:
         raise InputError(f"there is no benchmark {what!r}; choose loco, nav, depth or memory")
-    _print(figures, what, options.json)
+    kind, measure = _BENCHMARKS[what]
+    options = parse_options(kind, settings_first(kind, argv[1:]), f"bench {what}")
+    figures = measure(options)
+    if options.json:
+        print(json.dumps(figures, indent=2))
+        return 0
+    from vinl.cli.policies import flatten
+
+    table = Table("measure", "value", title=f"vinl bench {what}")
+    for key, value in flatten(figures).items():
+        table.add_row(key, str(value))
+    Console().print(table)
     return 0
 
 
 def _bench_loco(options: LocoOptions) -> dict[str, Any]:
-    _refuse(options.num_envs, "--num-envs")
-    _refuse(options.seconds, "--seconds")
+    _refuse(options, "num_envs", "seconds")
     device = _device(options.device)
     os.environ.setdefault("JAX_PLATFORMS", "cpu" if device == "cpu" else "cuda,cpu")
     from vinl.config.loader import load_config
@@ -126,8 +127,7 @@ def _bench_loco(options: LocoOptions) -> dict[str, Any]:
 
 
 def _bench_nav(options: NavOptions) -> dict[str, Any]:
-    for option in ("num_envs", "homes", "seconds"):
-        _refuse(getattr(options, option), f"--{option.replace('_', '-')}")
+    _refuse(options, "num_envs", "homes", "seconds")
     device = _device(options.device)
     if device == "cpu" and options.tree == "lbvh":
         raise InputError("--tree lbvh builds on a GPU; use sah on a CPU")
@@ -136,14 +136,8 @@ def _bench_nav(options: NavOptions) -> dict[str, Any]:
     from vinl.nav.config import NavConfig
 
     config = load_config(NavConfig, options.config, options.overrides)
-    return run_nav(
-        options.num_envs,
-        options.homes,
-        options.seconds,
-        device,
-        config,
-        None if options.tree == "auto" else options.tree,
-    )
+    tree = None if options.tree == "auto" else options.tree
+    return run_nav(options.num_envs, options.homes, options.seconds, device, config, tree)
 
 
 def _predict_memory(options: MemoryOptions) -> dict[str, Any]:
@@ -156,18 +150,11 @@ def _predict_memory(options: MemoryOptions) -> dict[str, Any]:
 
 
 def _bench_depth(options: DepthOptions) -> dict[str, Any]:
-    for option in ("num_images", "width", "height", "homes", "seconds"):
-        _refuse(getattr(options, option), f"--{option.replace('_', '-')}")
+    _refuse(options, "num_images", "width", "height", "homes", "seconds")
     from vinl.sensing.benchmark import run_depth
 
-    return run_depth(
-        options.num_images,
-        options.width,
-        options.height,
-        _device(options.device),
-        options.seconds,
-        options.homes,
-    )
+    device = _device(options.device)
+    return run_depth(options.num_images, options.width, options.height, device, options.seconds, options.homes)
 
 
 def _device(name: str) -> str:
@@ -176,18 +163,18 @@ def _device(name: str) -> str:
     return choose_training_device(name)
 
 
-def _refuse(value: float | None, option: str) -> None:
-    if value is not None and not value > 0:
-        raise InputError(f"{option} must be positive, got {value}")
+def _refuse(options: _Printed, *names: str) -> None:
+    """Numbers that are not positive."""
+    for name in names:
+        value = getattr(options, name)
+        if value is not None and not value > 0:
+            raise InputError(f"--{name.replace('_', '-')} must be positive, got {value}")
 
 
-def _print(figures: dict[str, Any], what: str, as_json: bool) -> None:
-    if as_json:
-        print(json.dumps(figures, indent=2))
-        return
-    from vinl.cli.policies import flatten
-
-    table = Table("measure", "value", title=f"vinl bench {what}")
-    for key, value in flatten(figures).items():
-        table.add_row(key, str(value))
-    Console().print(table)
+_BENCHMARKS: dict[str, tuple[Any, Callable[[Any], dict[str, Any]]]] = {
+    "loco": (LocoOptions, _bench_loco),
+    "depth": (DepthOptions, _bench_depth),
+    "nav": (NavOptions, _bench_nav),
+    "memory": (MemoryOptions, _predict_memory),
+}
+"""Options of each benchmark, and what measures."""

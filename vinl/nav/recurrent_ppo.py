@@ -82,11 +82,6 @@ class RecurrentPPO:
         """The present rate; waits for the device."""
         return self.rate.read()
 
-    @property
-    def entropy_coef(self) -> float:
-        """Weight of the entropy bonus."""
-        return self.entropy
-
     def let_actor_learn(self, learns: bool) -> None:
         """Whether the actor and its spread learn from the next minibatch on, or the critic's own weights alone."""
         self._actor_learns = learns
@@ -162,10 +157,6 @@ class RecurrentPPO:
     def train_mode(self) -> None:
         """No layer of the model acts differently in training."""
         self.model.train()
-
-    def eval_mode(self) -> None:
-        """See ``train_mode``."""
-        self.model.eval()
 
     def save(self) -> dict[str, Any]:
         """Weights, optimiser, rate, and the memory of the robots."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -14,8 +14,47 @@ FARTHEST = 1e6
 """No coordinate and no size is larger than this [m]; what is comes from a broken file."""
 
 
-@dataclass(frozen=True, eq=False)
-class Boxes:
+@dataclass(frozen=True, eq=False, repr=False)
+class _Table:
+    """A thing a row, in columns that ``WIDTH`` counts; refuses rows that no thing can have."""
+
+    rows: Float[np.ndarray, "n k"]
+    WIDTH: ClassVar[int]
+
+    def __post_init__(self) -> None:
+        name, rows = type(self).__name__.lower(), np.asarray(self.rows, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != self.WIDTH:
+            raise InputError(f"{name} need shape (n, {self.WIDTH}), got {rows.shape}")
+        if not np.isfinite(rows).all():
+            raise InputError(f"{name} hold a number that is not finite")
+        if (np.abs(rows) > FARTHEST).any():
+            raise InputError(f"{name} hold a number beyond {FARTHEST:g}")
+        if not all((size > 0).all() for size in self._sizes(rows)):
+            raise InputError(f"{name} need positive length, width and height")
+        object.__setattr__(self, "rows", rows)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)})"
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @classmethod
+    def empty(cls) -> Self:
+        """None at all."""
+        return cls(np.zeros((0, cls.WIDTH)))
+
+    def __add__(self, other: Self) -> Self:
+        return type(self)(np.concatenate([self.rows, other.rows]))
+
+    @staticmethod
+    def _sizes(rows: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Length, width and height [m]."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Boxes(_Table):
     """Boxes that stand upright, turned about the vertical axis only.
 
     Attributes:
@@ -26,34 +65,11 @@ class Boxes:
         InputError: if the shape is wrong, a number is not finite or beyond ``FARTHEST``, or a size is not positive.
     """
 
-    rows: Float[np.ndarray, "n 7"]
-    COLUMNS: ClassVar[tuple[str, ...]] = ("x", "y", "yaw", "length", "width", "bottom", "top")
+    WIDTH: ClassVar[int] = 7
 
-    def __post_init__(self) -> None:
-        rows = np.asarray(self.rows, dtype=np.float64)
-        if rows.ndim != 2 or rows.shape[1] != 7:
-            raise InputError(f"boxes need shape (n, 7), got {rows.shape}")
-        if not np.isfinite(rows).all():
-            raise InputError("boxes hold a number that is not finite")
-        if (np.abs(rows) > FARTHEST).any():
-            raise InputError(f"boxes hold a number beyond {FARTHEST:g}")
-        if (rows[:, 3:5] <= 0).any() or (rows[:, 6] <= rows[:, 5]).any():
-            raise InputError("boxes need positive length, width and height")
-        object.__setattr__(self, "rows", rows)
-
-    def __repr__(self) -> str:
-        return f"Boxes({len(self)})"
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    @classmethod
-    def empty(cls) -> Boxes:
-        """No boxes at all."""
-        return cls(np.zeros((0, 7)))
-
-    def __add__(self, other: Boxes) -> Boxes:
-        return Boxes(np.concatenate([self.rows, other.rows]))
+    @staticmethod
+    def _sizes(rows: np.ndarray) -> tuple[np.ndarray, ...]:
+        return rows[:, 3], rows[:, 4], rows[:, 6] - rows[:, 5]
 
     def __getitem__(self, index) -> Boxes:
         return Boxes(np.atleast_2d(self.rows[index]))
@@ -86,43 +102,22 @@ class Boxes:
         return np.abs(own) - self.rows[:, None, 3:5] / 2
 
 
-@dataclass(frozen=True, eq=False)
-class Blocks:
-    """Blocks that lie on the floor z = 0.
+@dataclass(frozen=True, eq=False, repr=False)
+class Blocks(_Table):
+    """Blocks that lie on the floor z = 0: height field, collision boxes, mesh and drawing derive from them.
 
     Attributes:
         rows: shape (n, 6), one block a row: x, y of the centre [m], yaw [rad], length [m], width [m], height [m].
 
     Raises:
-        InputError: if the shape is wrong, a number is not finite, or a size is not positive.
+        InputError: as for ``Boxes``.
     """
 
-    rows: Float[np.ndarray, "n 6"]
-    COLUMNS: ClassVar[tuple[str, ...]] = ("x", "y", "yaw", "length", "width", "height")
+    WIDTH: ClassVar[int] = 6
 
-    def __post_init__(self) -> None:
-        rows = np.asarray(self.rows, dtype=np.float64)
-        if rows.ndim != 2 or rows.shape[1] != 6:
-            raise InputError(f"blocks need shape (n, 6), got {rows.shape}")
-        if not np.isfinite(rows).all():
-            raise InputError("blocks hold a number that is not finite")
-        if (rows[:, 3:] <= 0).any():
-            raise InputError("blocks need positive length, width and height")
-        object.__setattr__(self, "rows", rows)
-
-    def __repr__(self) -> str:
-        return f"Blocks({len(self)})"
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    @classmethod
-    def empty(cls) -> Blocks:
-        """No blocks at all."""
-        return cls(np.zeros((0, 6)))
-
-    def __add__(self, other: Blocks) -> Blocks:
-        return Blocks(np.concatenate([self.rows, other.rows]))
+    @staticmethod
+    def _sizes(rows: np.ndarray) -> tuple[np.ndarray, ...]:
+        return rows[:, 3], rows[:, 4], rows[:, 5]
 
     def boxes(self) -> Boxes:
         """The same blocks as boxes that stand on the floor."""

@@ -174,7 +174,7 @@ def generate_home(seed: int, config: HomeConfig | None = None, resolution: float
     rng = Random(seed)
     name = f"home-{seed}"
     for _ in range(ATTEMPTS):
-        shell = _draw_shell(rng, config)
+        shell = draw_shell(rng, config)
         walls = Boxes(np.array(shell.walls))
         rects = [rect for room in shell.rooms for rect in room.rects]
         corners = np.array(rects)
@@ -194,18 +194,12 @@ def generate_home(seed: int, config: HomeConfig | None = None, resolution: float
     raise InputError(IMPOSSIBLE)
 
 
-def draw_shell(seed: int, config: HomeConfig) -> tuple[Random, Shell]:
-    """The rooms, walls and doors that a seed is tried with first, and the chance to draw the furniture from.
+def draw_shell(rng: Random, config: HomeConfig) -> Shell:
+    """Rooms, walls and doors.
 
     Raises:
         InputError: if no home fits the config.
     """
-    rng = Random(seed)
-    shell = _draw_shell(rng, config)
-    return rng, shell
-
-
-def _draw_shell(rng: Random, config: HomeConfig) -> Shell:
     for _ in range(ATTEMPTS):
         rooms = draw_office(rng, config) if config.layout == "office" else draw_rooms(rng, config)
         if not config.area[0] <= sum(room.area for room in rooms) <= config.area[1]:
