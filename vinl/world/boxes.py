@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from vinl.config.errors import InputError
+
+T = TypeVar("T", bound="_Table")
 
 FARTHEST = 1e6
 """No coordinate and no size is larger than this [m]; what is comes from a broken file."""
@@ -40,11 +42,11 @@ class _Table:
         return len(self.rows)
 
     @classmethod
-    def empty(cls) -> Self:
+    def empty(cls: type[T]) -> T:
         """None at all."""
         return cls(np.zeros((0, cls.WIDTH)))
 
-    def __add__(self, other: Self) -> Self:
+    def __add__(self: T, other: T) -> T:
         return type(self)(np.concatenate([self.rows, other.rows]))
 
     @staticmethod
