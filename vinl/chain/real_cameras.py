@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from vinl.chain.depth_cameras import DepthCameras
 from vinl.robot.aliengo import CONTROL_DT
-from vinl.sensing.sensor import DepthSensor
+from vinl.sensing.sensor import DepthSensor, mount_errors
 from vinl.sensing.sensor_config import SensorConfig
 
 _BETWEEN_IMAGES = 7919
@@ -70,7 +70,7 @@ class RealCameras:
         self._sensor.restart(_as_keys(keys), torch.ones(n, dtype=torch.bool))
         self._delay = np.round(self._sensor.drawn["delay"].numpy() / CONTROL_DT).astype(int)
         roll, pitch, height = self._sensor.drawn["offset"].numpy().astype(np.float64).T
-        self._raised, self._turned = height, _tilt(roll, pitch)
+        self._raised, self._turned = height, mount_errors(np, roll, pitch)
         self._images = torch.full((n, self.camera.height, self.camera.width), self.camera.far)
         self._taken = 0
 
@@ -108,11 +108,3 @@ class RealCameras:
 
 def _as_keys(numbers: np.ndarray) -> torch.Tensor:
     return torch.from_numpy((numbers % 2**31).astype(np.int32))
-
-
-def _tilt(roll: np.ndarray, pitch: np.ndarray) -> Float[np.ndarray, "n 3 3"]:
-    """Turned about the camera's own left (nose down is positive), then about its optical axis (right side down)."""
-    cp, sp, cr, sr, zero, one = np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll), 0 * roll, 0 * roll + 1
-    down = np.stack([cp, zero, sp, zero, one, zero, -sp, zero, cp], -1).reshape(-1, 3, 3)
-    side = np.stack([one, zero, zero, zero, cr, -sr, zero, sr, cr], -1).reshape(-1, 3, 3)
-    return down @ side

@@ -12,11 +12,11 @@ from vinl.config.loader import dump_config
 from vinl.gait.config import GaitConfig
 from vinl.gait.observation import SENSED_TABLE
 from vinl.loco.config import LocoConfig
+from vinl.loco.depth_cameras import TerrainCameras, terrain_mesh
 from vinl.loco.distillation import Distillation
 from vinl.loco.environment import LocoEnvironment
-from vinl.loco.sight import Sight, terrain_mesh
 from vinl.loco.student_config import StudentConfig
-from vinl.loco.vec_env import SightedVecEnv
+from vinl.loco.vec_env import CameraVecEnv
 from vinl.loco.warm_start import load_teacher
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.io import save_policy
@@ -101,8 +101,8 @@ def train_student(
     environment = LocoEnvironment(config)
     camera = settings.camera.record()
     mesh = terrain_mesh(environment.terrain)
-    sight = Sight(mesh, camera, settings.sight, config.num_envs, device, config.seed)
-    env = SightedVecEnv(environment, sight, device, stopwatch)
+    cameras = TerrainCameras(mesh, camera, settings.sensors, config.num_envs, device, config.seed)
+    env = CameraVecEnv(environment, cameras, device, stopwatch)
     algorithm = Distillation(student, teacher, settings.distillation, config.num_envs, device, stopwatch)
     env.followed = algorithm.gait
     commit = find_commit()

@@ -1,4 +1,4 @@
-"""What stage 3 can be told: the student's network, its camera, what is random about that, and how it learns."""
+"""What stage 3 can be told: the student's network, its camera, the errors of that, and how it learns."""
 
 from __future__ import annotations
 
@@ -6,15 +6,11 @@ import math
 from dataclasses import dataclass, field, replace
 
 from vinl.config.errors import InputError
-from vinl.config.limits import check_fields, check_range
+from vinl.config.limits import check_fields
 from vinl.policies.depth_memory import MEMORIES, VISIONS
 from vinl.policies.stepping_actor import CODES
 from vinl.robot.cameras import LOCOMOTION_CAMERA, Camera
-
-HOLES = ("far", "zero")
-
-MAX_DELAY = 0.04
-"""An image comes at most this late [s]: two control steps."""
+from vinl.sensing.sensor_config import SensorConfig
 
 
 @dataclass(frozen=True)
@@ -67,6 +63,8 @@ class CameraConfig:
         hfov: horizontal field of view [rad]; pixels are square.
         pitch_down: of the optical axis [rad].
         far: what is farther reads as this [m].
+        missing: what becomes of pixels without a return before the network: ``fill`` or ``as_is``, see
+            ``vinl.sensing.preparation``.
     """
 
     forward: float = LOCOMOTION_CAMERA.position[0]
@@ -75,52 +73,20 @@ class CameraConfig:
     hfov: float = LOCOMOTION_CAMERA.hfov
     pitch_down: float = LOCOMOTION_CAMERA.pitch_down
     far: float = LOCOMOTION_CAMERA.far
+    missing: str = "fill"
 
     def __post_init__(self) -> None:
         self.record()
+        if self.missing == "plane":
+            raise InputError("student.camera.missing: the student has one plane; use fill or as_is")
         if min(self.width, self.height) < 16:
             raise InputError(f"student.camera: at least 16 x 16 pixels, got {self.width} x {self.height}")
 
     def record(self) -> Camera:
         """The camera record, as it goes onto the policy card."""
         position = (self.forward, *LOCOMOTION_CAMERA.position[1:])
-        view = {"hfov": self.hfov, "pitch_down": self.pitch_down, "far": self.far}
+        view = {"hfov": self.hfov, "pitch_down": self.pitch_down, "far": self.far, "missing": self.missing}
         return replace(LOCOMOTION_CAMERA, position=position, width=self.width, height=self.height, **view)
-
-
-@dataclass(frozen=True)
-class SightConfig:
-    """What differs between what the camera record says and what the student sees; drawn anew for every episode.
-
-    Attributes:
-        position: largest offset of the camera along each axis [m].
-        angle: largest error of its roll, pitch and yaw [rad].
-        zoom: largest relative error of the tangent of half the field of view.
-        scale: largest relative error of all depths of an image.
-        noise: standard deviation of each pixel's depth, as a fraction of the depth.
-        holes: largest fraction of the image that is missing; each episode draws its own up to this.
-        hole_size: side of the squares that are missing [pixels].
-        hole_reads: what a missing pixel reads: ``far`` or ``zero``.
-        delay: range of the time by which every image of an episode is late [s], up to 0.04; in control steps, to the
-            nearest.
-    """
-
-    position: float = 0.01
-    angle: float = math.radians(2.0)
-    zoom: float = 0.02
-    scale: float = 0.02
-    noise: float = 0.01
-    holes: float = 0.04
-    hole_size: int = 4
-    hole_reads: str = "far"
-    delay: tuple[float, float] = (0.0, 0.04)
-
-    def __post_init__(self) -> None:
-        sizes, fractions = ("position", "angle", "noise"), ("zoom", "scale", "holes")
-        check_fields(self, "student.sight.", unsigned=sizes, fractions=fractions, counts=("hole_size",))
-        check_range("student.sight.delay", self.delay, 0.0, MAX_DELAY)
-        if self.hole_reads not in HOLES:
-            raise InputError(f"student.sight.hole_reads must be one of {', '.join(HOLES)}, got {self.hole_reads!r}")
 
 
 @dataclass(frozen=True)
@@ -181,9 +147,9 @@ class DistillationConfig:
 
 @dataclass(frozen=True)
 class StudentConfig:
-    """Stage 3: the settings that the other stages do not have."""
+    """Stage 3: the settings that the other stages do not have; ``sensors`` are the errors of the camera."""
 
     network: NetworkConfig = field(default_factory=NetworkConfig)
     camera: CameraConfig = field(default_factory=CameraConfig)
-    sight: SightConfig = field(default_factory=SightConfig)
+    sensors: SensorConfig = field(default_factory=SensorConfig)
     distillation: DistillationConfig = field(default_factory=DistillationConfig)

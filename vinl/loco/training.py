@@ -30,10 +30,10 @@ WARMUP_RATE = 1e-3
 def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
     """Our PPO settings under rsl-rl's names."""
     p = config.ppo
-    sight: dict[str, Any] = {"class_name": "vinl.loco.models:StepModel"}
+    actor: dict[str, Any] = {"class_name": "vinl.loco.models:StepModel"}
     if p.scan:
-        sight = {"class_name": "vinl.loco.models:MapModel", "encoder": list(p.encoder), "code": p.code}
-    sight["proprioception"] = STEPPING_TABLE.size
+        actor = {"class_name": "vinl.loco.models:MapModel", "encoder": list(p.encoder), "code": p.code}
+    actor["proprioception"] = STEPPING_TABLE.size
     update: dict[str, Any] = {"class_name": "PPO"}
     if p.update != "rsl_rl":
         update = {"class_name": "vinl.loco.fast_ppo:FastPPO", "graphs": p.update == "graphs"}
@@ -41,7 +41,7 @@ def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
         "num_steps_per_env": p.steps,
         "obs_groups": {"actor": ["policy"], "critic": ["critic"]},
         "actor": {
-            **sight,
+            **actor,
             "hidden_dims": list(p.actor),
             "activation": "elu",
             "distribution_cfg": {"class_name": "vinl.loco.models:UncheckedGaussian", "init_std": p.init_std},

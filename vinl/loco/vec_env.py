@@ -18,7 +18,7 @@ from vinl.loco.state import EnvState
 from vinl.rl.stopwatch import Stopwatch
 
 if TYPE_CHECKING:
-    from vinl.loco.sight import Sight  # Warp is started for stage 3 alone
+    from vinl.loco.depth_cameras import TerrainCameras  # Warp is started for stage 3 alone
 
 _LENT = 8
 """How many steps lent arrays are kept alive: the two libraries run on streams of their own, and neither may reuse
@@ -135,33 +135,37 @@ def _saved(x: np.ndarray) -> torch.Tensor:
     return torch.from_numpy(x.astype(np.int64) if x.dtype == np.uint32 else x.copy())
 
 
-class SightedVecEnv(LocoVecEnv):
+class CameraVecEnv(LocoVecEnv):
     """More observation groups: ``depth`` (n, H, W) float16 in [0, 1], and what a student learns to predict, ``plan``,
     ``heights`` and ``velocity``, see ``environment.Observations``.
 
     Args:
         environment: the robots.
-        sight: their cameras.
+        cameras: their depth cameras.
         device: torch device; JAX must run on the same kind.
         stopwatch: times ``simulate`` and ``render``.
     """
 
-    def __init__(self, environment: LocoEnvironment, sight: Sight, device: str, stopwatch: Stopwatch) -> None:
+    def __init__(
+        self, environment: LocoEnvironment, cameras: TerrainCameras, device: str, stopwatch: Stopwatch
+    ) -> None:
         super().__init__(environment, device)
-        self.sight, self._stopwatch = sight, stopwatch
+        self.cameras, self._stopwatch = cameras, stopwatch
 
     def save_state(self) -> dict[str, Any]:
         """The whole state of all robots and cameras."""
-        return {**super().save_state(), "sight": self.sight.save_state()}
+        return {**super().save_state(), "cameras": self.cameras.save_state()}
 
     def load_state(self, state: dict[str, Any]) -> None:
         """Go on from a saved state.
 
         Raises:
-            ValueError: the state is of another number of robots.
+            ValueError: the state is of another number of robots or of other cameras.
         """
+        if "cameras" not in state:
+            raise ValueError("it holds no cameras: another version wrote it")
         super().load_state(state)
-        self.sight.load_state(state["sight"])
+        self.cameras.load_state(state["cameras"])
 
     def _simulate(self, actions: torch.Tensor) -> StepResult:
         with self._stopwatch.part("simulate"):
@@ -172,5 +176,5 @@ class SightedVecEnv(LocoVecEnv):
         for name in ("plan", "heights", "velocity"):
             observation[name] = seen[name]
         with self._stopwatch.part("render"):
-            observation["depth"] = self.sight.look(seen["pose"], done)
+            observation["depth"] = self.cameras.look(seen["pose"], done)
         return observation

@@ -15,6 +15,20 @@ from vinl.sensing.sensor_kernels import PATCHES, Cameras, SensorRules, draw_came
 from vinl.sensing.structs import allocate_struct, fill_struct
 
 
+def mount_errors(xp: Any, roll: Any, pitch: Any) -> Any:
+    """How cameras are turned that are mounted a little off, (n, 3, 3), for numpy and torch (``xp``).
+
+    Args:
+        xp: ``numpy`` or ``torch``.
+        roll, pitch: (n,) [rad]: first about the camera's own left (nose down is positive), then about its optical axis
+            (right side down).
+    """
+    cp, sp, cr, sr, zero, one = xp.cos(pitch), xp.sin(pitch), xp.cos(roll), xp.sin(roll), 0 * roll, 0 * roll + 1
+    down = xp.stack([cp, zero, sp, zero, one, zero, -sp, zero, cp], -1).reshape(-1, 3, 3)
+    side = xp.stack([one, zero, zero, zero, cr, -sr, zero, sr, cr], -1).reshape(-1, 3, 3)
+    return down @ side
+
+
 class DepthSensor:
     """The depth cameras of n robots: what is drawn for each of them, and what becomes of their images.
 
