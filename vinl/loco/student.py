@@ -12,10 +12,10 @@ from vinl.config.loader import dump_config
 from vinl.gait.config import GaitConfig
 from vinl.gait.observation import SENSED_TABLE
 from vinl.loco.config import LocoConfig
-from vinl.loco.depth_cameras import TerrainCameras, terrain_mesh
 from vinl.loco.distillation import Distillation
 from vinl.loco.environment import LocoEnvironment
 from vinl.loco.student_config import StudentConfig
+from vinl.loco.terrain_cameras import TerrainCameras, terrain_mesh
 from vinl.loco.vec_env import CameraVecEnv
 from vinl.loco.warm_start import load_teacher
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card

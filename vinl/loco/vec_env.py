@@ -18,7 +18,7 @@ from vinl.loco.state import EnvState
 from vinl.rl.stopwatch import Stopwatch
 
 if TYPE_CHECKING:
-    from vinl.loco.depth_cameras import TerrainCameras  # Warp is started for stage 3 alone
+    from vinl.loco.terrain_cameras import TerrainCameras  # Warp is started for stage 3 alone
 
 _LENT = 8
 """How many steps lent arrays are kept alive: the two libraries run on streams of their own, and neither may reuse

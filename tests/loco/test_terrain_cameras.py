@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import torch
 
-from vinl.loco.depth_cameras import TerrainCameras, patch_mesh, terrain_mesh
 from vinl.loco.student_config import CameraConfig
+from vinl.loco.terrain_cameras import TerrainCameras, patch_mesh, terrain_mesh
 from vinl.robot.cameras import LOCOMOTION_CAMERA
 from vinl.sensing.sensor_config import SensorConfig, load_sensors
 from vinl.world.grid import GROUND, GridFrame
