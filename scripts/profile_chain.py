@@ -29,13 +29,14 @@ from vinl.chain.robot import Robot
 from vinl.chain.rollout import run_episodes
 from vinl.chain.workers import one_thread
 from vinl.config.loader import load_config
+from vinl.gait.observation import SENSED_TABLE
 from vinl.loco.config import LocoConfig
 from vinl.nav.config import NavConfig
 from vinl.policies.card import locomotion_card, navigation_card
-from vinl.policies.depth_actor import DepthActor
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.policies.nav_actor import NavActor
+from vinl.policies.stepping_actor import SteppingActor
 from vinl.robot.cameras import NAVIGATION_CAMERA, Camera
 from vinl.robot.observation import PROPRIOCEPTION_SIZE
 from vinl.world.clutter import CLUTTER
@@ -115,11 +116,9 @@ def untrained_locomotor() -> DepthPolicy:
     """The student's network and camera, with random weights."""
     config = load_config(LocoConfig, "loco/student").student
     assert config is not None
-    network, seen = config.network, config.camera
-    sizes = (seen.height, seen.width, network.visual, network.hidden, network.layers)
-    actor = DepthActor(network.vision, *sizes, memory=network.memory)
-    camera = seen.record()
-    return DepthPolicy(actor, locomotion_card("untrained", actor.describe(), scan=False, camera=camera.describe()))
+    network, camera = config.network, config.camera.record().describe()
+    actor = SteppingActor(camera, network.hidden, network.layers, network.memory)
+    return DepthPolicy(actor, locomotion_card("untrained", actor.describe(), table=SENSED_TABLE, camera=camera))
 
 
 def untrained_navigator() -> DepthPolicy:

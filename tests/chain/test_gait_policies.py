@@ -68,7 +68,7 @@ def test_rows_of_the_gait_stand_behind_proprioception_and_begin_anew(room: Floor
 
 
 def test_a_policy_without_the_trunks_velocity_is_not_given_it(room: FloorPlan) -> None:
-    network = SteppingActor(vision="none", hidden=8, layers=1, actor=[8])
+    network = SteppingActor(hidden=8, layers=1, actor=[8])
     card = locomotion_card("student", network.describe(), table=SENSED_TABLE)
     controller = open_controller(DepthPolicy(network, card), room, [Blocks.empty()] * N)
     controller.reset(N)

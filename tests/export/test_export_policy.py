@@ -121,9 +121,8 @@ def test_a_file_that_answers_otherwise_is_not_written(monkeypatch: pytest.Monkey
 def test_a_gait_is_an_input_and_an_output():
     """With the whole planner of footholds in the file."""
     torch.manual_seed(0)
-    network = SteppingActor(vision="none", hidden=16, layers=1, actor=(16,), code="map")
+    network = SteppingActor(hidden=16, layers=1, actor=(16,))
     network.requires_grad_(False)
-    network.head.weight.normal_(std=0.3)
     network.velocity.weight.normal_(std=1.0)
     card = PolicyCard("locomotion", "stepping", network.describe(), SENSED_TABLE.describe(), describe_action())
     loaded = DepthPolicy(network, card)

@@ -37,7 +37,7 @@ def test_observation_is_that_of_the_evaluation(fresh):
     qpos, qvel = np.asarray(state.body.qpos), np.asarray(state.body.qvel)
     ground = scan_ground(np, field.heights.reshape(-1), field.frame, qpos)
     expected = observe(np, qpos, qvel, np.asarray(state.command), np.asarray(state.action), ground)
-    gait = GaitState(*(np.asarray(x) for x in state.walk.gait))
+    gait = GaitState(*(np.asarray(x) for x in state.gait))
     rows = observe_gait(np, fresh.config.gait, gait, feet_in_heading_frame(np, qpos))
     expected = insert_gait(np, expected, rows)
     seen = fresh.observe()
@@ -91,17 +91,17 @@ def test_the_gait_walks_on_its_own_clock_and_can_be_given(fresh):
     swung = []
     for _ in range(60):
         fresh.step(jnp.zeros((8, 12)))
-        swung.append(np.asarray(swings(jnp, fresh.config.gait, fresh.state.walk.gait)))
+        swung.append(np.asarray(swings(jnp, fresh.config.gait, fresh.state.gait)))
     swung = np.array(swung)
     assert (swung[:, :, 0] == swung[:, :, 3]).mean() > 0.9  # diagonal legs together
     assert 0.25 < swung.mean() < 0.5
     measures = fresh.read_measures()
     assert measures["foot_rmse"] > 0.03 and measures["swing_hits"] > 0.3  # they stand
-    given = fresh.state.walk.gait._replace(phases=jnp.full((8, 4), 0.9))
+    given = fresh.state.gait._replace(phases=jnp.full((8, 4), 0.9))
     fresh.step(jnp.zeros((8, 12)), given)
-    period = np.asarray(fresh.state.walk.gait.period)[:, None]
+    period = np.asarray(fresh.state.gait.period)[:, None]
     going = np.asarray(fresh.state.life) > 0
-    ran = np.asarray(fresh.state.walk.gait.phases)
+    ran = np.asarray(fresh.state.gait.phases)
     np.testing.assert_allclose(ran[going], (0.9 + 0.02 * np.asarray(given.rate) / period)[going], atol=2e-3)
 
 

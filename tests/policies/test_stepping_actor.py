@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-import pytest
 import torch
 
 from vinl.gait.config import GaitConfig
@@ -17,12 +18,14 @@ from vinl.gait.state import aim, feet_in_heading_frame, start_gait, tick
 from vinl.policies.networks import build_network
 from vinl.policies.stepping_actor import Memory, Prediction, SteppingActor
 from vinl.robot.aliengo import DEFAULT_POSE, home_qpos
+from vinl.robot.cameras import LOCOMOTION_CAMERA
 from vinl.robot.rotation import rotate_inverse
 from vinl.world.boxes import Boxes
 from vinl.world.grid import BLOCK, GridFrame, flat_field, raise_boxes
 
 N = 3
-SMALL = {"vision": "none", "hidden": 16, "layers": 1, "actor": [16, 8]}
+CAMERA = replace(LOCOMOTION_CAMERA, missing="plane")
+SMALL = {"hidden": 16, "layers": 1, "actor": [16, 8]}
 
 
 def poses(rng: np.random.Generator, x: float) -> np.ndarray:
@@ -43,9 +46,9 @@ def sensed(qpos: np.ndarray, turning: np.ndarray, command: np.ndarray) -> torch.
     return torch.from_numpy((plain * SENSED_TABLE.scale).astype(np.float32))
 
 
-def actor(code: str) -> SteppingActor:
+def blind() -> SteppingActor:
     torch.manual_seed(0)
-    return SteppingActor(**SMALL, code=code).eval()  # type: ignore[arg-type]
+    return SteppingActor(**SMALL).eval()  # type: ignore[arg-type]
 
 
 def test_feet_and_heading_follow_from_joints_and_gravity() -> None:
@@ -55,9 +58,8 @@ def test_feet_and_heading_follow_from_joints_and_gravity() -> None:
     np.testing.assert_allclose(feet, feet_in_heading_frame(np, qpos), atol=1e-6)
 
 
-@pytest.mark.parametrize("code", ["plan", "map"])
-def test_told_the_truth_it_walks_as_one_that_has_the_map(code: str) -> None:
-    rng, network, config = np.random.default_rng(1), actor(code), GaitConfig()
+def test_told_the_truth_it_walks_as_one_that_has_the_map() -> None:
+    rng, network, config = np.random.default_rng(1), blind(), GaitConfig()
     frame = GridFrame(-4.0, -4.0, 0.05, (161, 161))
     field, bar = flat_field(frame), Boxes(np.array([[0.6, 0.0, 0.0, 0.2, 3.0, 0.0, 0.1]]))
     raise_boxes(field, bar, BLOCK)
@@ -79,31 +81,24 @@ def test_told_the_truth_it_walks_as_one_that_has_the_map(code: str) -> None:
         plan = plan_footholds(np, config, view, gait, level, command, feet)
         gait = aim(np, config, gait, plan, level, command, feet)
         shifts.append(np.abs(plan.offset).max())
-        rows = gait_rows(np, config, gait, feet) * scale
 
         said = Prediction(
             torch.from_numpy(velocity).float(),
-            torch.from_numpy(
-                np.concatenate([x.reshape(N, -1) for x in plan], 1)
-                if code == "plan"
-                else view.height(np.broadcast_to(POINTS, (N, *POINTS.shape))) + qpos[:, 2:3]
-            ).float(),
+            torch.from_numpy(view.height(np.broadcast_to(POINTS, (N, *POINTS.shape))) + qpos[:, 2:3]).float(),
         )
         action, new = network.walk(vector, said, memory)
-        memory = Memory(memory.network, new, said.velocity)
-        if code == "plan":
-            full = torch.cat([said.velocity * 2.0, vector, torch.from_numpy(rows).float()], 1)
-            torch.testing.assert_close(action, network.actor(full), atol=1e-3, rtol=1e-3)
-            np.testing.assert_allclose(new.target.numpy(), gait.target, atol=1e-4)
-        else:  # heights on cells of 5 cm are not the distances that the world's map has
-            gait = gait._replace(rate=new.rate.numpy().astype(float))
-            assert np.median(np.abs(new.target.numpy() - gait.target)[..., :2]) < 0.03
-            gait = type(gait)(*(x.numpy().astype(float) for x in new))
+        memory = Memory(memory.network, new, said.velocity, None)
+        # heights on cells of 5 cm are not the distances that the world's map has
+        assert np.median(np.abs(new.target.numpy() - gait.target)[..., :2]) < 0.03
+        gait = type(gait)(*(x.numpy().astype(float) for x in new))
+        rows = gait_rows(np, config, gait, feet) * scale
+        full = torch.cat([said.velocity * 2.0, vector, torch.from_numpy(rows).float()], 1)
+        torch.testing.assert_close(action, network.actor(full), atol=1e-3, rtol=1e-3)
     assert max(shifts) > 0.1  # the bar was in the way
 
 
 def test_steps_in_a_row_are_the_same_as_one_by_one_and_fresh_robots_forget() -> None:
-    network, rng = actor("map"), np.random.default_rng(2)
+    network, rng = blind(), np.random.default_rng(2)
     command = np.tile([0.4, 0.0, 0.0], (N, 1))
     vectors = torch.stack([sensed(poses(rng, 0.0), np.zeros((N, 3)), command) for _ in range(6)])
     fresh = torch.zeros(6, N, dtype=torch.bool)
@@ -123,10 +118,10 @@ def test_steps_in_a_row_are_the_same_as_one_by_one_and_fresh_robots_forget() -> 
 
 
 def test_a_card_rebuilds_it_with_its_gait() -> None:
-    network = SteppingActor(**SMALL, code="plan", gait={"stride": 0.5, "period": [0.5, 1.0]})  # type: ignore[arg-type]
+    network = SteppingActor(**SMALL, camera=CAMERA.describe(), gait={"stride": 0.5, "period": [0.5, 1.0]})  # type: ignore[arg-type]
     with torch.device("meta"):
         again = build_network(network.describe())
     assert isinstance(again, SteppingActor)
     assert again.gait == network.gait and again.observation_size == SENSED_TABLE.size
-    assert again.units.device.type == "cpu"
+    assert again.elevation is not None and again.elevation.rays.device.type == "cpu"
     assert STEPPING_TABLE.size == SENSED_TABLE.size + 3 + sum(row.size for row in GAIT_ROWS)

@@ -244,7 +244,7 @@ def test_planned_footholds_are_those_of_the_gait_and_outlast_a_block():
 
 
 def test_footholds_of_a_policy_that_predicts_them():
-    network = SteppingActor(vision="none", hidden=8, layers=1, actor=[8])
+    network = SteppingActor(hidden=8, layers=1, actor=[8])
     policy = DepthPolicy(network, locomotion_card("student", network.describe(), table=SENSED_TABLE))
     session = Session(LiveChain(open_ground("flat", 0), policy, "oracle", CONFIG))
     assert session.snapshot.footholds.predicted is None

@@ -1,7 +1,7 @@
-"""DAgger: the student walks by what it believes; at every step it is told how fast the robot was and what lay there.
+"""DAgger: the student walks by what it believes; at every step it is told how fast the robot was.
 
-What it learns are predictions: the velocity of the trunk, and the foothold plan or the heights of the ground about the
-robot. Gait, planner and the teacher's actor behind them stay as they are.
+What it learns is to predict the velocity of the trunk. Its elevation map, planner and the teacher's actor follow from
+that and stay as they are.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from vinl.rl.stopwatch import Stopwatch
 from vinl.robot.observation import PROPRIOCEPTION, PROPRIOCEPTION_SIZE
 
 VELOCITY_UNIT = 0.2
-"""An error of the velocity of this size weighs as much as one of the code of the size of its units [m/s]."""
+"""Unit of the velocity's error in the loss [m/s]."""
 
 _SENSED = slice(PROPRIOCEPTION.place("base_linear_velocity").stop, PROPRIOCEPTION_SIZE)
 """What the robot measures, in the environment's observation."""
@@ -31,9 +31,8 @@ _SENSED = slice(PROPRIOCEPTION.place("base_linear_velocity").stop, PROPRIOCEPTIO
 class Distillation:
     """A learner with the names that ``TrainingLoop`` calls.
 
-    The roll-out keeps images, what the network was given beside them, and the labels on the device. The update runs
-    the network over them again, in windows of ``bptt`` steps that begin with the memory that the roll-out had there: to
-    keep the roll-out's own graph would save one of four passes and take tens of times the memory.
+    The roll-out keeps what the estimator was given, and the labels, on the device. The update runs it over them again,
+    in windows of ``bptt`` steps that begin with the memory that the roll-out had there.
 
     Args:
         student: its actor is overwritten with the teacher's and stays as it is.
@@ -68,13 +67,12 @@ class Distillation:
         t, n = config.steps, num_envs
         self._inputs = torch.zeros(t, n, student.vector_size, device=device)
         self._velocity = torch.zeros(t, n, 3, device=device)
-        self._code = torch.zeros(t, n, student.code_size, device=device)
         self._fresh = torch.zeros(t, n, dtype=torch.bool, device=device)
-        self._depth = torch.zeros(t, n, *(student.image or (1, 1)), dtype=torch.float16, device=device)
         self._state = student.initial_state(n, device)
         self._starts = [tuple(torch.zeros_like(x) for x in self._network_state()) for _ in range(t // config.bptt)]
         self._begun = torch.ones(n, dtype=torch.bool, device=device)
         self._order = torch.arange(n, device=device) / n
+        self._mapping = torch.zeros(2, device=device)  # squared errors of the maps, and squares of the heights
         self._step = 0
 
     def gait(self) -> GaitState:
@@ -88,29 +86,24 @@ class Distillation:
         with self._stopwatch.part("network"):
             k, c, student = self._step, self.config, self.student
             vector = obs["policy"][:, _SENSED]
-            truth = Prediction(obs["velocity"], obs["plan" if student.code == "plan" else "heights"])
+            truth = Prediction(obs["velocity"], obs["heights"])
             memory = student.begin(vector, student.unpack(self._state), self._begun)
             inputs = student.network_input(vector, memory)
-            if student.image is not None:
-                self._depth[k].copy_(obs["depth"])
             for kept, now in (
-                (self._inputs, inputs), (self._velocity, truth.velocity), (self._code, truth.code),
-                (self._fresh, self._begun),
+                (self._inputs, inputs), (self._velocity, truth.velocity), (self._fresh, self._begun),
             ):  # fmt: skip
                 kept[k].copy_(now)
             if k % c.bptt == 0:
                 for start, now in zip(self._starts[k // c.bptt], memory.network, strict=True):
                     start.copy_(now)
-            with self._reduced():
-                said, network = student.encode(
-                    self._depth[k : k + 1], inputs[None], memory.network, self._fresh[k : k + 1]
-                )
-            believed = Prediction(said.velocity[0], said.code[0])
-            if self.teacher_fraction > 0:
-                told = self._order[:, None] < self.teacher_fraction
-                believed = Prediction(*(torch.where(told, a, b) for a, b in zip(truth, believed, strict=True)))
+            said, network = student.estimate(inputs[None], memory.network, self._fresh[k : k + 1])
+            told = self._order[:, None] < self.teacher_fraction
+            velocity = torch.where(told, truth.velocity, said[0])
+            heights, map_ = student.survey(obs["depth"], vector, velocity, memory)
+            self._mapping += torch.stack([((heights - truth.heights) ** 2).sum(), (truth.heights**2).sum()])
+            believed = Prediction(velocity, torch.where(told, truth.heights, heights))
             action, gait = student.walk(vector, believed, memory)
-            self._state = student.pack(Memory(network, gait, believed.velocity))
+            self._state = student.pack(Memory(network, gait, velocity, map_))
             return action
 
     def process_env_step(self, obs: TensorDict, rewards: Tensor, dones: Tensor, extras: dict[str, Any]) -> None:
@@ -133,32 +126,31 @@ class Distillation:
             return self._update()
 
     def _update(self) -> dict[str, float]:
-        c, n = self.config, self._code.shape[1]
+        c, n = self.config, self._velocity.shape[1]
         for group in self.optimizer.param_groups:
             group["lr"] = self.learning_rate
         parts = min(c.minibatches, n)
-        totals = torch.zeros(4, device=self.device)
+        totals = torch.zeros(2, device=self.device)
         for _ in range(c.epochs):
             for robots in torch.randperm(n, device=self.device).chunk(parts):
-                velocity_loss, code_loss, unexplained = self.losses(robots)
-                loss = c.velocity_weight * velocity_loss / VELOCITY_UNIT**2 + c.code_weight * code_loss
+                loss = self.loss(robots)
                 self.optimizer.zero_grad(set_to_none=True)
-                loss.backward()
+                (loss / VELOCITY_UNIT**2).backward()
                 norm = nn.utils.clip_grad_norm_(self._learned, c.max_grad_norm)
                 self.optimizer.step()
-                totals += torch.stack([velocity_loss, code_loss, unexplained, norm]).detach()
-        velocity, code, unexplained, norm = (totals / (c.epochs * parts)).tolist()
+                totals += torch.stack([loss, norm]).detach()
+        velocity, norm = (totals / (c.epochs * parts)).tolist()
+        missed, raised = self._mapping.tolist()
+        self._mapping.zero_()
         return {
             "velocity_rmse": velocity**0.5,
-            "code": code,
-            "unexplained": unexplained,
+            "map_error": missed / max(raised, 1e-9),
             "gradient_norm": norm,
             "teacher_share": self.teacher_fraction,
         }
 
-    def losses(self, robots: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Of some robots' windows: mean squared errors of each component of the velocity [(m/s)^2] and of the code, in
-        its units; the code's error as a fraction of the labels' variance."""
+    def loss(self, robots: Tensor) -> Tensor:
+        """Mean squared error of each component of the velocity in some robots' windows [(m/s)^2]."""
         windows = self.config.steps // self.config.bptt
 
         def cut(buffer: Tensor) -> Tensor:
@@ -167,18 +159,8 @@ class Distillation:
             return chosen.transpose(0, 1).flatten(1, 2)
 
         state = tuple(torch.cat([start[:, robots] for start in part], 1) for part in zip(*self._starts, strict=True))
-        with self._reduced():
-            said, _ = self.student.encode(cut(self._depth), cut(self._inputs), state, cut(self._fresh))
-        code, units = cut(self._code), self.student.units
-        velocity_loss = functional.mse_loss(said.velocity, cut(self._velocity))
-        code_loss = functional.mse_loss(said.code / units, code / units)
-        spread = (code / units).var((0, 1), correction=0).mean().clamp_min(1e-9)
-        return velocity_loss, code_loss, code_loss.detach() / spread
-
-    def _reduced(self) -> torch.autocast:
-        """bfloat16 for the convolutions on a GPU."""
-        on = self.config.bfloat16 and self.device.type == "cuda"
-        return torch.autocast(self.device.type, torch.bfloat16, enabled=on)
+        said, _ = self.student.estimate(cut(self._inputs), state, cut(self._fresh))
+        return functional.mse_loss(said, cut(self._velocity))
 
     # ---- what the loop needs --------------------------------------------------------------------------------------
 

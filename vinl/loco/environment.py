@@ -21,7 +21,7 @@ from vinl.loco.randomisation import draw_commands, split_by_name, uniform
 from vinl.loco.rewards import Motion, reward_terms
 from vinl.loco.simulation import Body, Contacts, DeviceGround, Simulation, delay_steps
 from vinl.loco.state import EnvState, begin_episode, count_steps, first_state, strip_weak_types
-from vinl.loco.walking import Steps, flatten_plan, go_on, local_heights
+from vinl.loco.walking import Steps, go_on, local_heights
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
 from vinl.robot.observation import CLIP, HEIGHT_SCAN, observe
 from vinl.robot.rotation import rotate_inverse
@@ -52,17 +52,15 @@ class Observations(NamedTuple):
         exact: the same without, for the critic, and for a teacher.
         privileged: (n, ``PRIVILEGED``) what only the critic knows beside them: contacts, the errors of what is
             measured, what the robot is like, and whether blocks collide.
-        plan: (n, 20) the foothold plan that the gait follows, as ``walking.flatten_plan`` has it.
         heights: (n, 741) of the ground at ``gait.local_map.POINTS`` above the floor that the feet stand on [m], in
-            stage 3; (n, 0) elsewhere. Plan, heights and the exact base velocity [m/s] in the trunk's frame,
-            ``velocity`` (n, 3), are what a student learns to read from images.
+            stage 3; (n, 0) elsewhere.
+        velocity: (n, 3) the exact one of the trunk, in its frame [m/s], which a student learns to estimate.
         pose: (n, 7) position [m] and quaternion of the trunks.
     """
 
     noisy: Float[Array, "n numbers"]
     exact: Float[Array, "n numbers"]
     privileged: Float[Array, "n privileged"]
-    plan: Float[Array, "n 20"]
     heights: Float[Array, "n points"]
     velocity: Float[Array, "n 3"]
     pose: Float[Array, "n 7"]
@@ -169,7 +167,7 @@ class LocoEnvironment:
         if gait is not None:
             # copies: the step reuses the memory of the state that it is given
             own = GaitState(*(jax.device_put(jnp.array(x, jnp.float32), jax.devices()[0]) for x in gait))
-            self.state = self.state._replace(walk=self.state.walk._replace(gait=own))
+            self.state = self.state._replace(gait=own)
         self.state, self._lost, result = self._step(
             self.simulation.ground, self.state, self._lost, action, self._settings
         )
@@ -210,7 +208,7 @@ class LocoEnvironment:
         body, traits, c = state.body, state.traits, self.config.randomisation
         heights = scan_ground(jnp, ground.heights, self.simulation.frame, body.qpos)
         plain = observe(jnp, body.qpos, body.qvel, state.command, state.action, heights)
-        rows = observe_gait(jnp, self.config.gait, state.walk.gait, feet_in_heading_frame(jnp, body.qpos))
+        rows = observe_gait(jnp, self.config.gait, state.gait, feet_in_heading_frame(jnp, body.qpos))
         exact = insert_gait(jnp, plain, rows)
         noise = 2 * jax.random.uniform(jax.random.fold_in(state.key, 1), exact.shape) - 1
         errors = {
@@ -245,10 +243,9 @@ class LocoEnvironment:
         noisy = exact + settings.noise * (jnp.asarray(self._noise) * noise + bias)
         floor = jnp.zeros((self.num_envs, 0))
         if self.config.stage == 3:
-            floor = local_heights(self.config.gait, ground, self.simulation.frame, state.walk.gait, body)
+            floor = local_heights(self.config.gait, ground, self.simulation.frame, state.gait, body)
         velocity = exact[:, _VELOCITY] / STEPPING_MAP_TABLE.scale[_VELOCITY]
-        plan = flatten_plan(state.walk.plan)
-        return Observations(noisy, exact, privileged, plan, floor, velocity, body.qpos[:, :7] + 0.0)
+        return Observations(noisy, exact, privileged, floor, velocity, body.qpos[:, :7] + 0.0)
 
     def _advance(
         self, ground: DeviceGround, old: EnvState, lost: Lost, given: Float[Array, "n 12"], settings: Settings
@@ -272,7 +269,7 @@ class LocoEnvironment:
         body = Body(*(jnp.where(broken[:, None], last, now) for now, last in zip(body, old.body, strict=True)))
         torque = jnp.where(broken[:, None], 0.0, torque)
 
-        walk, steps = go_on(c.gait, ground, self.simulation.frame, old.walk, old.body, body, old.command)
+        gait, steps = go_on(c.gait, ground, self.simulation.frame, old.gait, old.body, body, old.command)
         motion = self._motion(ground, old, body, contacts, torque, action, broken, steps)
         terms = reward_terms(motion, rewards["sigma"])
         weighted = {name: terms[name] * (rewards[name] * CONTROL_DT) for name in TERMS}
@@ -335,7 +332,7 @@ class LocoEnvironment:
             body=ended(start.body, body),
             action=ended(jnp.zeros_like(action), action),
             targets=ended(start.targets, targets),
-            walk=ended(start.walk, walk),
+            gait=ended(start.gait, gait),
             command=jnp.where(renew[:, None], command, old.command),
             command_left=jnp.where(renew, left, old.command_left - 1),
             push_left=jnp.where(push, round(c.randomisation.push_interval / CONTROL_DT), old.push_left - 1),
@@ -360,7 +357,7 @@ class LocoEnvironment:
         )
         state = strip_weak_types(state)
         seen = self._observe(ground, state, settings)
-        blind = ~jnp.isfinite(jnp.concatenate([seen.exact, seen.privileged, seen.plan, seen.heights], 1).sum(1))
+        blind = ~jnp.isfinite(jnp.concatenate([seen.exact, seen.privileged, seen.heights], 1).sum(1))
         shown = Observations(*(jnp.where(blind[:, None], 0.0, x) for x in seen))._replace(pose=seen.pose)
         state = state._replace(life=jnp.where(blind, -1, state.life))  # the next step sets the robot back
         return state, lost, StepResult(shown, reward, done.astype(jnp.uint8), timeout.astype(jnp.uint8))

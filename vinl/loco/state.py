@@ -8,11 +8,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from vinl.gait.state import GaitState
 from vinl.loco.config import LocoConfig, RandomisationConfig
 from vinl.loco.measures import MEASURES, TERMS
 from vinl.loco.randomisation import Traits, draw_commands, draw_traits, split_by_name, uniform
 from vinl.loco.simulation import PAST, Body
-from vinl.loco.walking import Walk, start_walk
+from vinl.loco.walking import begin_gait
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
 
 
@@ -24,7 +25,7 @@ class EnvState(NamedTuple):
         body: physics.
         action: (n, 12) last one.
         targets: (n, past, 12) joint targets, the newest first [rad].
-        walk: gait and foothold plan.
+        gait: clock, paths and footholds.
         command: (n, 3); command_left: (n,) steps until the next.
         push_left: (n,) steps until the next push.
         step: (n,) of the episode, from a random one at first; life: (n,) steps since the start, -1 where the
@@ -43,7 +44,7 @@ class EnvState(NamedTuple):
     body: Body
     action: Float[Array, "n 12"]
     targets: Float[Array, "n past 12"]
-    walk: Walk
+    gait: GaitState
     command: Float[Array, "n 3"]
     command_left: Int[Array, " n"]
     push_left: Int[Array, " n"]
@@ -95,7 +96,7 @@ class Episode(NamedTuple):
 
     body: Body
     targets: Float[Array, "n past 12"]
-    walk: Walk
+    gait: GaitState
     velocity_error: Float[Array, "n 3"]
     traits: Traits
 
@@ -152,7 +153,7 @@ def begin_episode(
     return Episode(
         body=body,
         targets=jnp.tile(jnp.asarray(DEFAULT_POSE, jnp.float32), (n, PAST, 1)),
-        walk=start_walk(config.gait, body),
+        gait=begin_gait(config.gait, body),
         velocity_error=c.velocity_bias * jax.random.normal(keys.velocity_error, (n, 3)),
         traits=draw_traits(c, keys.traits, n),
     )
@@ -177,7 +178,7 @@ def first_state(config: LocoConfig, starts: Float[Array, "levels columns 3"], ke
         body=start.body,
         action=jnp.zeros((n, 12)),
         targets=start.targets,
-        walk=start.walk,
+        gait=start.gait,
         command=command,
         command_left=left,
         push_left=(uniform(keys.push, (n,), (0.0, c.randomisation.push_interval)) / CONTROL_DT).astype(jnp.int32),

@@ -1,4 +1,4 @@
-"""Stage 3: a student with a camera learns what its teacher knows of the ground, in the same MJX environment."""
+"""Stage 3: a student with a camera in place of its teacher's map learns how fast it walks, in the same environment."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def describe_student_figures(row: dict[str, float]) -> dict[str, str]:
     """What the progress bar shows."""
     return {
         "samples/s": f"{row['samples_per_second']:,.0f}",
-        "code": f"{row['loss/unexplained']:.1%} unexplained",
+        "map": f"{row['loss/map_error']:.0%} off",
         "velocity": f"{row['loss/velocity_rmse']:.3f} m/s",
         "feet/m": f"{row['foot_block_per_m']:.2f}",
         "falls/min": f"{row['falls_per_minute']:.2f}",
@@ -47,11 +47,10 @@ def describe_student_figures(row: dict[str, float]) -> dict[str, str]:
 
 def build_student(config: StudentConfig, teacher: StepActor, gait: GaitConfig) -> SteppingActor:
     """A fresh student in front of a teacher's actor and planner."""
-    sizes, camera = asdict(config.network), config.camera
+    sizes = asdict(config.network)
     remember = sizes.pop("remember")
     student = SteppingActor(
-        height=camera.height,
-        width=camera.width,
+        camera=config.camera.record().describe(),
         actor=teacher.arguments["actor"],
         actions=teacher.arguments["actions"],
         gait=asdict(gait),
@@ -114,7 +113,7 @@ def train_student(
             policy.describe(),
             action,
             table=SENSED_TABLE,
-            camera=camera.describe() if policy.image else None,
+            camera=camera.describe(),
             training={**dump_config(config), "origin": described},
             seed=config.seed,
             samples=samples,

@@ -7,47 +7,31 @@ from dataclasses import dataclass, field, replace
 
 from vinl.config.errors import InputError
 from vinl.config.limits import check_fields
-from vinl.policies.depth_memory import MEMORIES, VISIONS
-from vinl.policies.stepping_actor import CODES
+from vinl.policies.depth_memory import MEMORIES
 from vinl.robot.cameras import LOCOMOTION_CAMERA, Camera
 from vinl.sensing.sensor_config import SensorConfig
 
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """The student's network; planner and actor behind it are the teacher's [paper III-C].
+    """The student's estimator of the velocity; planner and actor behind it are the teacher's [paper III-C].
 
     Attributes:
-        vision: ``cnn``, ``resnet18`` or ``none`` (blind, but with memory).
-        visual: numbers that the image becomes.
         hidden, layers: of the memory.
-        memory: ``lstm``, or ``mlp`` for plain layers without memory [paper IV-B].
-        planes: channels of the first stage of ``resnet18``.
+        memory: ``lstm``, or ``mlp`` for plain layers and a map of the newest image alone [paper IV-B].
         remember: at the start the LSTM's cells keep what they hold for 1 to this many control steps, spread evenly;
             0: the paper's start, which forgets within two steps.
-        code: what is predicted of the ground: ``plan`` (the foothold plan) or ``map`` (heights about the robot, which
-            the planner reads).
     """
 
-    vision: str = "cnn"
-    visual: int = 32
     hidden: int = 64
     layers: int = 2
     memory: str = "lstm"
-    planes: int = 32
     remember: int = 50
-    code: str = "map"
 
     def __post_init__(self) -> None:
-        if self.vision not in VISIONS:
-            raise InputError(f"student.network.vision must be one of {', '.join(VISIONS)}, got {self.vision!r}")
         if self.memory not in MEMORIES:
             raise InputError(f"student.network.memory must be one of {', '.join(MEMORIES)}, got {self.memory!r}")
-        check_fields(self, "student.network.", counts=("visual", "hidden", "layers", "planes"))
-        if self.planes % 16:
-            raise InputError(f"student.network.planes must be a multiple of 16, got {self.planes}")
-        if self.code not in CODES:
-            raise InputError(f"student.network.code must be one of {', '.join(CODES)}, got {self.code!r}")
+        check_fields(self, "student.network.", counts=("hidden", "layers"))
         if self.remember < 0 or self.remember == 1:
             raise InputError(f"student.network.remember must be 0 or at least 2, got {self.remember}")
 
@@ -63,8 +47,6 @@ class CameraConfig:
         hfov: horizontal field of view [rad]; pixels are square.
         pitch_down: of the optical axis [rad].
         far: what is farther reads as this [m].
-        missing: what becomes of pixels without a return before the network: ``fill`` or ``as_is``, see
-            ``vinl.sensing.preparation``.
     """
 
     forward: float = LOCOMOTION_CAMERA.position[0]
@@ -73,52 +55,44 @@ class CameraConfig:
     hfov: float = LOCOMOTION_CAMERA.hfov
     pitch_down: float = LOCOMOTION_CAMERA.pitch_down
     far: float = LOCOMOTION_CAMERA.far
-    missing: str = "fill"
 
     def __post_init__(self) -> None:
         self.record()
-        if self.missing == "plane":
-            raise InputError("student.camera.missing: the student has one plane; use fill or as_is")
         if min(self.width, self.height) < 16:
             raise InputError(f"student.camera: at least 16 x 16 pixels, got {self.width} x {self.height}")
 
     def record(self) -> Camera:
-        """The camera record, as it goes onto the policy card."""
+        """The camera record, as it goes onto the policy card; pixels without a return tell the map nothing."""
         position = (self.forward, *LOCOMOTION_CAMERA.position[1:])
-        view = {"hfov": self.hfov, "pitch_down": self.pitch_down, "far": self.far, "missing": self.missing}
+        view = {"hfov": self.hfov, "pitch_down": self.pitch_down, "far": self.far, "missing": "plane"}
         return replace(LOCOMOTION_CAMERA, position=position, width=self.width, height=self.height, **view)
 
 
 @dataclass(frozen=True)
 class DistillationConfig:
-    """DAgger: the student walks by what it predicts, and is told what was true [paper III-C].
+    """DAgger: the student walks by what it believes, and is told what was true [paper III-C].
 
     Attributes:
         steps: control steps of each robot between updates.
         bptt: control steps that gradients flow back through; divides ``steps``. 1 is the paper's.
         epochs, minibatches: passes over a roll-out and parts of each; a part holds all steps of some robots.
-        velocity_weight, code_weight: of the errors of the velocity and of the code.
         learning_rate, last_learning_rate: of Adam, at the start and at the end; a cosine between them.
         warmup: fraction of the iterations in which the rate rises from zero.
         max_grad_norm: gradients are clipped to this norm.
         teacher_share: fraction of the robots that walk by what is true at the start; 0 is the paper's.
         teacher_until: fraction of the iterations after which none does.
-        bfloat16: the convolutions in bfloat16 on a GPU.
     """
 
     steps: int = 24
     bptt: int = 24
     epochs: int = 2
     minibatches: int = 8
-    velocity_weight: float = 1.0
-    code_weight: float = 1.0
     learning_rate: float = 1e-3
     last_learning_rate: float = 3e-5
     warmup: float = 0.01
     max_grad_norm: float = 1.0
     teacher_share: float = 1.0
     teacher_until: float = 0.04
-    bfloat16: bool = True
 
     def __post_init__(self) -> None:
         check_fields(
@@ -126,7 +100,6 @@ class DistillationConfig:
             "student.distillation.",
             counts=("steps", "bptt", "epochs", "minibatches"),
             positive=("last_learning_rate", "max_grad_norm"),
-            unsigned=("velocity_weight", "code_weight"),
             fractions=("teacher_share", "teacher_until", "warmup"),
         )
         if self.steps % self.bptt:

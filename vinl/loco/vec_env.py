@@ -136,7 +136,7 @@ def _saved(x: np.ndarray) -> torch.Tensor:
 
 
 class CameraVecEnv(LocoVecEnv):
-    """More observation groups: ``depth`` (n, H, W) float16 in [0, 1], and what a student learns to predict, ``plan``,
+    """More observation groups: ``depth`` (n, H, W) float16 in [0, 1], and what is true of what a student believes,
     ``heights`` and ``velocity``, see ``environment.Observations``.
 
     Args:
@@ -173,7 +173,7 @@ class CameraVecEnv(LocoVecEnv):
 
     def _pack(self, seen: dict[str, torch.Tensor], done: torch.Tensor | None) -> TensorDict:
         observation = super()._pack(seen, done)
-        for name in ("plan", "heights", "velocity"):
+        for name in ("heights", "velocity"):
             observation[name] = seen[name]
         with self._stopwatch.part("render"):
             observation["depth"] = self.cameras.look(seen["pose"], done)

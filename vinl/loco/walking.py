@@ -15,7 +15,6 @@ from vinl.gait.local_map import POINTS
 from vinl.gait.path import swing_path
 from vinl.gait.state import (
     GaitState,
-    Plan,
     aim,
     feet_in_heading_frame,
     knees_in_heading_frame,
@@ -33,18 +32,6 @@ from vinl.world.grid import GridFrame
 
 _ALONG_SHANK = (0.12, 0.25, 0.4, 0.6, 0.8)
 """Places along a shank that are held against blocks, from the foot (0) to the knee (1)."""
-
-
-class Walk(NamedTuple):
-    """What the gait remembers of the robots, and the plan that it follows.
-
-    Attributes:
-        gait: clock, paths and footholds.
-        plan: of the last control step.
-    """
-
-    gait: GaitState
-    plan: Plan
 
 
 class Steps(NamedTuple):
@@ -68,34 +55,32 @@ class Steps(NamedTuple):
     height_error: Float[Array, "n 4"]
 
 
-def start_walk(config: GaitConfig, body: Body) -> Walk:
+def begin_gait(config: GaitConfig, body: Body) -> GaitState:
     """Of robots that stand where they are."""
-    feet = feet_in_heading_frame(jnp, body.qpos)
-    level = 0 * feet[..., 2]
-    return Walk(start_gait(jnp, config, feet), Plan(0 * feet[..., :2], level, level + config.lift, level + 1.0))
+    return start_gait(jnp, config, feet_in_heading_frame(jnp, body.qpos))
 
 
 def go_on(
     config: GaitConfig,
     ground: DeviceGround,
     frame: GridFrame,
-    walk: Walk,
+    gait: GaitState,
     before: Body,
     body: Body,
     command: Float[Array, "n 3"],
-) -> tuple[Walk, Steps]:
+) -> tuple[GaitState, Steps]:
     """One control step of the gait, planned on the exact map and with the exact velocity.
 
     Args:
         config: of the gait.
         ground, frame: the map and where its cells lie.
-        walk: before the step.
+        gait: before the step.
         before, body: the robots before and after the step.
         command: that they have.
     """
     feet, velocity = feet_in_heading_frame(jnp, body.qpos), velocity_in_heading_frame(jnp, body.qpos, body.qvel)
     moved = motion_between(jnp, before.qpos, body.qpos)
-    gait = tick(jnp, config, walk.gait, moved, command, feet)
+    gait = tick(jnp, config, gait, moved, command, feet)
     view = FieldView(jnp, ground.map, frame, body.qpos)
     plan = plan_footholds(jnp, config, view if config.map else None, gait, velocity, command, feet)
     gait = aim(jnp, config, gait, plan, velocity, command, feet)
@@ -118,7 +103,7 @@ def go_on(
         speed=jnp.hypot(feet[..., 0] - x, feet[..., 1] - y) / CONTROL_DT,
         height_error=jnp.where(swing, 0.0, hips - feet[..., 2] + FOOT_RADIUS - gait.hip[:, None]),
     )
-    return Walk(gait, plan), steps
+    return gait, steps
 
 
 def _leg_gap(view: FieldView, body: Body, feet: Float[Array, "n 4 3"]) -> Float[Array, "n 4"]:
@@ -138,9 +123,3 @@ def local_heights(
     floor = jnp.sum(stands * feet[..., 2], 1) / jnp.maximum(stands.sum(1), 1.0) - FOOT_RADIUS
     points = jnp.broadcast_to(jnp.asarray(POINTS, jnp.float32), (len(feet), *POINTS.shape))
     return FieldView(jnp, ground.map, frame, body.qpos).height(points) - floor[:, None]
-
-
-def flatten_plan(plan: Plan) -> Float[Array, "n 20"]:
-    """A plan as numbers: offsets, rises and apexes [m], rates; legs in the order of ``LEGS``."""
-    n = plan.rise.shape[0]
-    return jnp.concatenate([plan.offset.reshape(n, -1), plan.rise, plan.apex, plan.rate], -1)

@@ -164,9 +164,13 @@ def read_camera(card: PolicyCard, image: tuple[int, int] | None) -> Camera | Non
             f"{source}: the image of the card is {camera.width} x {camera.height} pixels, "
             f"the network takes {image[1]} x {image[0]}"
         )
-    channels = int(card.network.get("channels", 1))
-    if (camera.missing == "plane") != (channels == 2):
+    own = card.network.get("camera")
+    if own is not None and build_config(Camera, own, source="network: camera") != camera:
+        raise InputError(f"{source}: it is not the one that the network maps the ground with")
+    marks = own is not None or int(card.network.get("channels", 1)) == 2
+    if (camera.missing == "plane") != marks:
         raise InputError(
-            f"{source}: missing is {camera.missing!r}, but the network takes {channels} channels; plane goes with 2"
+            f"{source}: missing is {camera.missing!r}, but the network takes images with{'' if marks else 'out'} marks "
+            f"where nothing returned, which plane gives"
         )
     return camera

@@ -1,0 +1,189 @@
+"""An elevation map about the robot, from depth images and dead reckoning: what the camera saw stays where it lies while
+the robot walks over it.
+
+Nothing in it is learned. Points of a depth image are turned upright by the direction of gravity, set on the floor that
+the image itself shows, and kept in square cells that do not move; the robot moves among them by its own estimate of
+its velocity [Fankhauser et al. 2014: robot-centric elevation mapping]. All of it is array operations of fixed shape, so
+that an exported policy carries it along.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor, nn
+
+from vinl.gait.local_map import POINTS
+from vinl.gait.proprioception import into_heading_frame
+from vinl.robot.cameras import Camera
+
+CELL = 0.025
+"""Side of a cell [m]: half of those that the planner reads, so that turning the map moves no edge by more."""
+
+SIDE = 112
+"""Cells along each side: 2.8 m, what the planner reads at any heading. Cells that the robot leaves behind are used
+again for those ahead."""
+
+UNSEEN = -10.0
+"""Height of a cell that no image showed [m]."""
+
+NEAR = 1.1
+"""Points farther ahead of the trunk's middle are not used [m]: there a row of the image is wider than a cell of the
+planner, and an angle's error lifts the floor to an obstacle."""
+
+_BLEND = 0.5
+"""How far a cell moves to what the newest image shows."""
+
+_FLOOR = 0.03
+"""Points so near to the floor that the legs tell of are taken for floor [m], ..."""
+
+_SURE = 20.0
+"""... and tilt it as if so many points lay on the legs' floor."""
+
+_ROUGH = 0.02
+"""What rises less is floor to the planner [m]."""
+
+_QUARTERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
+
+
+class MapState(NamedTuple):
+    """What is remembered from step to step.
+
+    Attributes:
+        pose: (n, 3) x, y [m] and heading [rad] since the episode began, by dead reckoning.
+        heights: (n, 12544) of the highest point in each cell above the floor [m]; ``UNSEEN``.
+    """
+
+    pose: Tensor
+    heights: Tensor
+
+
+class ElevationMap(nn.Module):
+    """Maps of n robots with a camera; holds no weights.
+
+    Args:
+        camera: what the images are of. It has to mark pixels without a return (``missing`` is ``"plane"``).
+    """
+
+    rays: Tensor
+    eye: Tensor
+    points: Tensor
+
+    def __init__(self, camera: Camera) -> None:
+        super().__init__()
+        self.far = camera.far
+        tan_x, tan_y = camera.tan_half
+        across = (torch.arange(camera.width, device="cpu") + 0.5) / camera.width * 2 - 1
+        down = (torch.arange(camera.height, device="cpu") + 0.5) / camera.height * 2 - 1
+        v, u = torch.meshgrid(down * tan_y, across * tan_x, indexing="ij")
+        turn = torch.tensor(camera.rotation(), dtype=torch.float32, device="cpu")
+        rays = torch.stack([torch.ones_like(u), -u, -v], -1).reshape(-1, 3) @ turn.T
+        quarters = torch.tensor(_QUARTERS, device="cpu") * (CELL / 2)
+        middles = torch.tensor(POINTS, dtype=torch.float32, device="cpu")
+        for name, numbers in (
+            ("rays", rays),
+            ("eye", torch.tensor(camera.position, dtype=torch.float32, device="cpu")),
+            ("points", (middles[:, None] + quarters).reshape(-1, 2)),
+        ):
+            self.register_buffer(name, numbers, persistent=False)
+
+    @staticmethod
+    def start(n: int, device: torch.device | str | None = None) -> MapState:
+        """Maps of n robots that have seen nothing."""
+        return MapState(torch.zeros(n, 3, device=device), torch.full((n, SIDE**2), UNSEEN, device=device))
+
+    @staticmethod
+    def forget(state: MapState, fresh: Bool[Tensor, " n"]) -> MapState:
+        """The maps, empty for those who begin anew."""
+        return MapState(
+            torch.where(fresh[:, None], 0.0, state.pose), torch.where(fresh[:, None], UNSEEN, state.heights)
+        )
+
+    def move(self, state: MapState, motion: Float[Tensor, "n 4"]) -> MapState:
+        """After a control step.
+
+        Args:
+            state: before it.
+            motion: of the trunk in it, as ``vinl.gait.proprioception.motion_of`` gives it [m, rad].
+        """
+        before = self._cell_of(state.pose[:, :2])
+        half = state.pose[:, 2] + 0.5 * motion[:, 3]
+        way = _turned(half, motion[:, None, :2])[:, 0]
+        pose = torch.cat([state.pose[:, :2] + way, state.pose[:, 2:] + motion[:, 3:]], 1)
+        after = self._cell_of(pose[:, :2])
+        stale = _place(before) != _place(after)  # (n, 2, SIDE): columns and rows that stand for other ground now
+        heights = state.heights.reshape(-1, SIDE, SIDE)
+        heights = torch.where(stale[:, 0, :, None] | stale[:, 1, None, :], UNSEEN, heights)
+        return MapState(pose, heights.reshape(-1, SIDE**2))
+
+    def see(
+        self,
+        state: MapState,
+        image: Float[Tensor, "n height width"],
+        axes: Float[Tensor, "n 3 3"],
+        floor: Float[Tensor, " n"],
+    ) -> MapState:
+        """With what an image shows.
+
+        Args:
+            state: before it.
+            image: depth as a fraction of the camera's far limit; negative where nothing returned.
+            axes: of the heading frame in the trunk's.
+            floor: height of the floor under the legs in the heading frame [m].
+        """
+        depth = image.flatten(1).float()
+        points = into_heading_frame(axes, self.eye + self.rays * (depth * self.far)[..., None])
+        ahead, z = points[..., 0], points[..., 2] - floor[:, None]
+        known = (depth > 0) & (depth < 1) & (ahead < NEAR)
+        z = z - _tilt(z, ahead, known)
+        cells = self._index(state.pose, points[..., :2])
+        blank = torch.full_like(state.heights, UNSEEN)
+        top = blank.scatter_reduce(1, cells, torch.where(known, z, UNSEEN), "amax")
+        seen = top > 0.5 * UNSEEN
+        blended = torch.where(state.heights > 0.5 * UNSEEN, state.heights + _BLEND * (top - state.heights), top)
+        return MapState(state.pose, torch.where(seen, blended, state.heights))
+
+    def read(self, state: MapState) -> Float[Tensor, "n 741"]:
+        """Heights above the floor at the planner's points [m]; what was never seen is level floor."""
+        points = self.points.expand(len(state.pose), -1, -1)
+        found = torch.gather(state.heights, 1, self._index(state.pose, points))
+        highest = found.reshape(len(found), -1, len(_QUARTERS)).amax(-1)
+        return torch.where((highest.abs() < _ROUGH) | (highest < 0.5 * UNSEEN), 0.0, highest)
+
+    @staticmethod
+    def _cell_of(xy: Tensor) -> Tensor:
+        return torch.floor(xy / CELL).long()
+
+    def _index(self, pose: Float[Tensor, "n 3"], xy: Float[Tensor, "n k 2"]) -> Int[Tensor, "n k"]:
+        """Of the cells at points of the heading frame."""
+        cell = self._cell_of(pose[:, None, :2] + _turned(pose[:, 2], xy)) % SIDE
+        return cell[..., 0] * SIDE + cell[..., 1]
+
+
+def _turned(angle: Float[Tensor, " n"], xy: Float[Tensor, "n k 2"]) -> Float[Tensor, "n k 2"]:
+    c, s = torch.cos(angle)[:, None], torch.sin(angle)[:, None]
+    x, y = xy.unbind(-1)
+    return torch.stack([c * x - s * y, s * x + c * y], -1)
+
+
+def _place(cell: Int[Tensor, "n 2"]) -> Int[Tensor, "n 2 side"]:
+    """Which of the cells that do not move each column and row stands for with the robot in this one."""
+    return cell[..., None] + (torch.arange(SIDE, device=cell.device) - cell[..., None] + SIDE // 2) % SIDE
+
+
+def _tilt(z: Tensor, ahead: Tensor, known: Tensor) -> Tensor:
+    """How high the floor seems to lie at each point: a plane through the points near it, tilted fore and aft. It takes
+    out what the camera's mount, gravity's direction and the legs get wrong."""
+    x = ahead - 0.7  # about the middle of what is seen
+    found = torch.zeros_like(z)
+    for _ in range(2):
+        left = z - found
+        w = (known & (left.abs() < _FLOOR)).float()
+        n, wx, wxx = w.sum(1) + _SURE, (w * x).sum(1), (w * x * x).sum(1) + 0.1 * _SURE
+        wz, wxz = (w * left).sum(1), (w * x * left).sum(1)
+        scale = n * wxx - wx * wx
+        level, slope = (wz * wxx - wx * wxz) / scale, (n * wxz - wx * wz) / scale
+        found = found + level[:, None] + slope[:, None] * x
+    return found
