@@ -22,7 +22,7 @@ PANELS = {
     "foot_block_per_m": "feet and shanks on blocks, control steps per metre",
     "stride": "stride: way between two landings of a foot [m]",
     "trunk_over_blocks": "time above blocks / the share of ground they cover",
-    "loss/unexplained": "unexplained share of the teacher's code",
+    "loss/map_error": "squared error of the map / squared heights",
     "success": "success",
     "spl": "SPL",
     "collisions": "cancelled steps of an episode",

@@ -36,6 +36,19 @@ def odd_in_fifth_place(x: Tensor) -> Tensor:
     return x
 
 
+def odd_in_last_place(x: Tensor) -> Tensor:
+    x = x.clone()
+    if len(x) > 1:
+        x[-1] = torch.nextafter(x[-1], x[-1] + 1)
+    return x
+
+
+def test_where_the_place_in_a_call_counts_each_is_asked_alone() -> None:
+    network = Asked(odd_in_last_place)
+    assert find_safe_sizes(network) == (1,)
+    assert split_calls(3, find_safe_sizes(network)) == [(1, 1)] * 3
+
+
 def test_all_sizes_that_agree_are_safe() -> None:
     assert find_safe_sizes(Asked(lambda x: x)) == CANDIDATES
 

@@ -10,6 +10,7 @@ import torch
 from vinl.loco.student_config import CameraConfig
 from vinl.loco.terrain_cameras import TerrainCameras, patch_mesh, terrain_mesh
 from vinl.robot.cameras import LOCOMOTION_CAMERA
+from vinl.sensing.preparation import MARK
 from vinl.sensing.sensor_config import SensorConfig, load_sensors
 from vinl.world.grid import GROUND, GridFrame
 from vinl.world.terrain import Terrain, TerrainConfig, build_terrain
@@ -120,9 +121,10 @@ def test_pixels_without_a_return_read_as_the_camera_says(terrain, poses):
     left = see(terrain, holes, poses, replace(CAMERA, missing="as_is"))
     lost = left != exact
     assert 0.1 < lost.float().mean() < 0.4 and (left[lost] == 1.0).all()
-    filled = see(terrain, holes, poses)
+    filled, marked = (see(terrain, holes, poses, replace(CAMERA, missing=how)) for how in ("fill", "plane"))
     kept = ~lost & (exact < 1)  # a lost pixel is no other than a far one, left as it is
-    assert torch.equal(filled[kept], exact[kept])
+    assert torch.equal(filled[kept], exact[kept]) and torch.equal(marked[kept], exact[kept])
+    assert (marked[lost] == MARK).all()
     off = [(image - exact).float()[lost].abs().mean() for image in (filled, left)]
     assert off[0] < 0.3 * off[1]
 
@@ -143,4 +145,4 @@ def test_resumed_cameras_see_the_same(terrain, poses):
 
 
 def test_the_default_camera_is_the_robots():
-    assert CameraConfig().record() == replace(LOCOMOTION_CAMERA, missing="fill")
+    assert CameraConfig().record() == replace(LOCOMOTION_CAMERA, missing="plane")

@@ -57,8 +57,8 @@ def test_shipped_policies_see_through_the_robots_cameras(name):
 def test_trainings_begin_with_the_robots_cameras():
     student, navigator = load_config(LocoConfig, "loco/student").student, load_config(NavConfig, "nav/default").camera
     assert student is not None and navigator is not None
-    filled = replace(LOCOMOTION_CAMERA, missing="fill")  # the student that ships is of before that
-    assert (student.camera.record(), navigator.record()) == (filled, NAVIGATION_CAMERA)
+    marked = replace(LOCOMOTION_CAMERA, missing="plane")  # the student that ships is of before that
+    assert (student.camera.record(), navigator.record()) == (marked, NAVIGATION_CAMERA)
     assert NavCameraConfig().record() == NAVIGATION_CAMERA
 
 

@@ -152,7 +152,8 @@ _found: weakref.WeakKeyDictionary[PolicyNetwork, dict[int, tuple[int, ...]]] = w
 
 
 def find_safe_sizes(network: PolicyNetwork) -> tuple[int, ...]:
-    """Sizes of calls, ascending, that give the same bits as calls of ``BATCH``; that one is always among them.
+    """Sizes of calls, ascending, that give the same bits as calls of ``BATCH``; 1 alone where not even those do,
+    because a robot's place in the call counts.
 
     Libraries choose by the number of rows how to add up, and choose otherwise on other machines, so it is tried: here,
     with these weights and as many threads as torch has now. Sums in another order differ in the last bits whatever the
@@ -163,9 +164,12 @@ def find_safe_sizes(network: PolicyNetwork) -> tuple[int, ...]:
     if threads not in known:
         inputs = _make_inputs(network)
         wanted = _answer(network, inputs, BATCH)
-        known[threads] = tuple(
-            size for size in CANDIDATES if size == BATCH or _equal(_answer(network, inputs, size), wanted)
-        )
+        if all(_equal(_answer(network, inputs, BATCH, shift), wanted) for shift in range(1, BATCH)):
+            others = (size for size in CANDIDATES if size != BATCH)
+            equal = (size for size in others if _equal(_answer(network, inputs, size), wanted))
+            known[threads] = tuple(sorted((BATCH, *equal)))
+        else:  # here a robot's place in the call changes its bits: each is asked by itself
+            known[threads] = (1,)
     return known[threads]
 
 
@@ -193,12 +197,13 @@ def _make_inputs(network: PolicyNetwork) -> tuple[Tensor, ...]:
     return (vector, image, *state)
 
 
-def _answer(network: PolicyNetwork, inputs: Sequence[Tensor], size: int) -> list[Tensor]:
-    """Actions and states from calls of one size, one row a robot; the last call begins again with the first robots."""
+def _answer(network: PolicyNetwork, inputs: Sequence[Tensor], size: int, shift: int = 0) -> list[Tensor]:
+    """Actions and states from calls of one size, one row a robot; the last call begins again with the first robots.
+    With a ``shift`` the first call begins with another robot, so that each has another place in its call."""
     vector, *seen = inputs
     calls = []
     with torch.no_grad():
-        for first in range(0, _ROWS, size):
+        for first in range(shift, _ROWS + shift, size):
             rows = torch.arange(first, first + size) % _ROWS
             if not seen:
                 calls.append([network(vector[rows])])
@@ -208,7 +213,7 @@ def _answer(network: PolicyNetwork, inputs: Sequence[Tensor], size: int) -> list
             # called as ``BatchedPolicy`` does, layout in memory included: it decides too how libraries add up
             answer, after = cast(Any, network)(image[rows][None], vector[rows][None], before, fresh)
             calls.append([answer[0], *(part.transpose(0, 1) for part in after)])
-    return [torch.cat(parts)[:_ROWS] for parts in zip(*calls, strict=True)]
+    return [torch.cat(parts)[:_ROWS].roll(shift, 0) for parts in zip(*calls, strict=True)]
 
 
 def _equal(some: Sequence[Tensor], others: Sequence[Tensor]) -> bool:
