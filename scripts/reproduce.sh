@@ -19,11 +19,11 @@ train() {  # name, then what a new run is started with
   fi
 }
 
-train rough --stage 1                                                          #  69 M   4.4 min
-train teacher --stage 2 --from "$runs/rough"                                   # 216 M  13.9 min
-train student --stage 3 --from "$runs/teacher"                                 #  29 M   7.0 min
+train rough --stage 1                                                          #  39 M   2.5 min
+train teacher --stage 2 --from "$runs/rough"                                   # 147 M   9.5 min
+train student --stage 3 --from "$runs/teacher"                                 #  20 M   4.7 min
 
 # baselines [paper IV-B]: the same samples in each stage
-train blind --config loco/blind --from "$runs/rough"                           # 216 M  13.9 min
-train no_pretraining --config loco/no_pretraining                              # 216 M  13.9 min
-train mlp --config loco/mlp --from "$runs/teacher"                             #  29 M   7.0 min
+train blind --config loco/blind --from "$runs/rough"                           # 147 M   9.5 min
+train no_pretraining --config loco/no_pretraining                              # 147 M   9.5 min
+train mlp --config loco/mlp --from "$runs/teacher"                             #  20 M   4.7 min

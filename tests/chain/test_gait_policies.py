@@ -39,7 +39,7 @@ class Listening(LocomotionPolicy):
 def teacher() -> Listening:
     """Random weights; stands nearly still."""
     torch.manual_seed(0)
-    network: PolicyNetwork = StepActor(STEPPING_TABLE.size, actor=[16])
+    network: PolicyNetwork = StepActor(actor=[16])
     return Listening(network, locomotion_card("steps", network.describe(), scan=False, gait=asdict(GaitConfig())))
 
 

@@ -10,7 +10,6 @@ import pytest
 
 from vinl.config.loader import load_config
 from vinl.gait.config import GaitConfig
-from vinl.gait.observation import STEPPING_TABLE
 from vinl.loco.config import LocoConfig
 from vinl.loco.environment import LocoEnvironment
 from vinl.policies.card import locomotion_card
@@ -47,7 +46,7 @@ def small_config() -> LocoConfig:
 @pytest.fixture(scope="session")
 def walker(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An untrained policy that knows the gait of the trainings."""
-    network = StepActor(STEPPING_TABLE.size)
+    network = StepActor()
     card = locomotion_card("walker", network.describe(), scan=False, gait=asdict(GaitConfig()))
     return save_policy(tmp_path_factory.mktemp("policies") / "walker", network, card)
 

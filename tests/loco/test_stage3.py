@@ -106,7 +106,7 @@ def test_policies_that_cannot_teach_are_refused(tmp_path, capsys):
     scanning, student, gait = tmp_path / "scanning", tmp_path / "student", asdict(GaitConfig())
     network = MapActor(STEPPING_TABLE.size, actor=(8,))
     save_policy(scanning, network, locomotion_card("scanning", network.describe(), gait=gait))
-    sees = stage3.build_student(StudentConfig(), StepActor(STEPPING_TABLE.size), GaitConfig())
+    sees = stage3.build_student(StudentConfig(), StepActor(), GaitConfig())
     camera = StudentConfig().camera.record().describe()
     save_policy(student, sees, locomotion_card("student", sees.describe(), table=SENSED_TABLE, camera=camera))
     for folder, words in ((scanning, "MapActor"), (student, "without the gait"), (tmp_path / "none", "unknown")):
@@ -168,7 +168,7 @@ def learner(memory: str = "lstm", n: int = 6, **settings) -> Distillation:
         camera=replace(StudentConfig().camera, width=32, height=18),
         distillation=DistillationConfig(**{"steps": 8, "bptt": 4, "minibatches": 2, **settings}),
     )
-    teacher = StepActor(STEPPING_TABLE.size, actor=(16,))
+    teacher = StepActor(actor=(16,))
     student = stage3.build_student(config, teacher, GaitConfig())
     return Distillation(student, teacher, config.distillation, n, "cpu", Stopwatch("cpu"))
 
@@ -226,7 +226,7 @@ def test_cells_that_are_told_to_remember_do():
     for steps in (0, 50):
         torch.manual_seed(0)
         config = StudentConfig(network=NetworkConfig(remember=steps))
-        student = stage3.build_student(config, StepActor(STEPPING_TABLE.size), GaitConfig())
+        student = stage3.build_student(config, StepActor(), GaitConfig())
         inputs = torch.randn(25, 1, student.vector_size, requires_grad=True)
         network = student.unpack(student.initial_state(1)).network
         said, _ = student.estimate(inputs, network, torch.zeros(25, 1).bool())

@@ -10,7 +10,7 @@ import vinl
 from vinl.config.errors import InputError
 from vinl.config.loader import load_config
 from vinl.gait.config import GaitConfig
-from vinl.gait.observation import SENSED_TABLE, STEPPING_TABLE
+from vinl.gait.observation import SENSED_TABLE
 from vinl.policies.card import locomotion_card
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.networks import PolicyNetwork, StepActor
@@ -218,7 +218,7 @@ def test_footholds_are_shown_where_a_policy_tells_them(rough: Policy):
 def with_gait() -> Policy:
     """Observes the rows of a gait; random weights, it stands nearly still."""
     torch.manual_seed(0)
-    network: PolicyNetwork = StepActor(STEPPING_TABLE.size, actor=[16])
+    network: PolicyNetwork = StepActor(actor=[16])
     return LocomotionPolicy(
         network, locomotion_card("steps", network.describe(), scan=False, gait=asdict(GaitConfig()))
     )

@@ -26,6 +26,7 @@ class GaitConfig:
         lift: height of the swing path's apex over what lies below it [m].
         edge: distance from a foot's surface to a block below which a foothold is forbidden [m].
         shank: distance from the axis of a shank to a block below which a foothold is forbidden [m].
+        capture: a foothold moves by the trunk's velocity error times this [s]: a robot that is too fast catches itself.
         map: choose footholds on the map; False: Raibert's as they are, for policies that know no map.
         modulate: largest change of a leg's rate while its foot stands, as a fraction: it meets a block better early or
             late. Swings keep to the period: a leg that should swing slower than it is used to comes down too early.
@@ -33,8 +34,8 @@ class GaitConfig:
 
     stride: float = 0.48
     period: tuple[float, float] = (0.6, 1.4)
-    swing_time: float = 0.45
-    swing_fraction: float = 0.45
+    swing_time: float = 0.36
+    swing_fraction: float = 0.36
     stance: tuple[float, float] = (0.24, 0.15)
     hip_height: float = 0.43
     highest_hip: float = 0.47
@@ -43,6 +44,7 @@ class GaitConfig:
     shank: float = 0.04
     map: bool = True
     modulate: float = 0.4
+    capture: float = 0.35
 
     def __post_init__(self) -> None:
         low, high = self.period

@@ -8,7 +8,7 @@ from typing import Any
 from vinl.gait.clock import swing_fraction
 from vinl.gait.config import GaitConfig
 from vinl.gait.state import GaitState
-from vinl.robot.aliengo import CONTROL_DT
+from vinl.robot.aliengo import CONTROL_DT, KD, KP
 
 _WAIT = 0.08
 """At both ends of a swing the foot moves up or down alone, for this fraction of it: the shank follows the foot."""
@@ -23,16 +23,18 @@ GAIT_TERMS: tuple[tuple[str, int, float, str], ...] = (
     ("apex", 4, 5.0, "m"),
     ("leg_phase", 8, 1.0, "sine, cosine"),
     ("swing", 4, 1.0, "1"),
+    ("swing_ahead", 4, 1.0, "1"),
     ("rate", 4, 3.0, "1"),
     ("hip", 1, 20.0, "m"),
 )
 """Name, size, scale and unit of what ``gait_rows`` gives, in its order: from each foot to the next point of its path
 (x, y, z), to where the path is ``LOOK_AHEAD`` later, to its foothold (x, y) and to the height of its apex, all in the
-heading frame; its phase; whether it swings; how much faster its clock runs while it
+heading frame; its phase; whether it swings, now and ``LOOK_AHEAD`` later; how much faster its clock runs while it
 stands; and how far the hips should rise above their usual height."""
 
-LOOK_AHEAD = 0.1
-"""Legs follow their targets so much later, latency included: a policy that sees only the next step is late [s]."""
+LOOK_AHEAD = KD / KP + CONTROL_DT / 2 + 0.015
+"""Legs follow their targets so much later [s]: damping over stiffness, half a control step, and the mean latency of the
+training. Commanded where its path is then, a foot in the air keeps to it within 1.5 cm."""
 
 GAIT_SIZE = sum(size for _, size, _, _ in GAIT_TERMS)
 
@@ -50,10 +52,8 @@ def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: f
     Returns:
         (n, 4, 3) [m].
     """
-    phases, fraction = gait.phases, swing_fraction(xp, config, gait.period)[:, None]
-    swinging = phases < fraction
-    stands = xp.where(swinging, 0 * phases, (1.0 - phases) / gait.rate)  # in periods, until the foot lifts off
-    since = xp.where(swinging, phases, 0 * phases) + later / gait.period[:, None] - stands
+    since, fraction = _since_lift_off(xp, config, gait, later)
+    swinging = gait.phases < fraction
     s = xp.clip(since / fraction, 0.0, 1.0)
     lift = xp.where(swinging[..., None], gait.lift, feet)
     forth = xp.clip((s - _WAIT) / (1 - 2 * _WAIT), 0.0, 1.0)
@@ -63,6 +63,14 @@ def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: f
     height = straight[..., 2] + (gait.apex - straight[..., 2]) * bell
     path = xp.concatenate([straight[..., :2], height[..., None]], -1)
     return xp.where((since > 0)[..., None] | swinging[..., None], path, feet)
+
+
+def _since_lift_off(xp: Any, config: GaitConfig, gait: GaitState, later: float) -> tuple[Any, Any]:
+    """(n, 4) periods that a foot will have swung then, less than 0 before its lift-off, and (n, 1) that it swings."""
+    phases, fraction = gait.phases, swing_fraction(xp, config, gait.period)[:, None]
+    swinging = phases < fraction
+    stands = xp.where(swinging, 0 * phases, (1.0 - phases) / gait.rate)
+    return xp.where(swinging, phases, 0 * phases) + later / gait.period[:, None] - stands, fraction
 
 
 def gait_rows(xp: Any, config: GaitConfig, gait: GaitState, feet: Any) -> Any:
@@ -76,6 +84,7 @@ def gait_rows(xp: Any, config: GaitConfig, gait: GaitState, feet: Any) -> Any:
     swinging = phases < swing_fraction(xp, config, gait.period)[:, None]
     error = swing_path(xp, config, gait, feet, CONTROL_DT) - feet
     apex = xp.where(swinging, gait.apex - feet[..., 2], 0 * feet[..., 2])
+    since, fraction = _since_lift_off(xp, config, gait, LOOK_AHEAD)
     angle = 2 * math.pi * phases
     parts = [
         xp.clip(error, -0.5, 0.5).reshape(n, 12),
@@ -84,6 +93,7 @@ def gait_rows(xp: Any, config: GaitConfig, gait: GaitState, feet: Any) -> Any:
         xp.clip(apex, -0.5, 0.5),
         xp.stack([xp.sin(angle), xp.cos(angle)], -1).reshape(n, 8),
         xp.where(swinging, 1.0 + 0 * apex, 0 * apex),
+        xp.where((since > 0) & (since < fraction), 1.0 + 0 * apex, 0 * apex),
         gait.rate - 1.0,
         (gait.hip - config.hip_height)[:, None],
     ]

@@ -17,8 +17,8 @@ from vinl.gait.config import GaitConfig
 from vinl.robot.aliengo import CONTROL_DT, LINK, foot_positions, knee_positions
 from vinl.robot.rotation import wrap_angle, yaw_of
 
-START_PHASE = 0.95
-"""Phase in which a robot that stands waits for its first command."""
+START_PHASE = 0.9
+"""Phase in which a robot that stands waits for its next command: no foot is about to leave the ground."""
 
 FREEZE = 0.75
 """A foot that has swung for this fraction of its swing comes down where it was going."""
@@ -143,7 +143,7 @@ def tick(xp: Any, config: GaitConfig, gait: GaitState, motion: Any, command: Any
     period = follow_period(xp, config, gait.period, command)
     pace = xp.where(gait.phases < fraction, 1.0 + 0 * gait.rate, gait.rate)
     ran = (gait.phases + CONTROL_DT * pace / period[:, None]) % 1.0
-    phases = xp.where(rests[:, None], gait.phases, ran)
+    phases = xp.where(rests[:, None], xp.clip(gait.phases, None, START_PHASE), ran)
     leaves = (phases < gait.phases)[..., None]  # has passed 1
     lift = xp.where(leaves, feet, carried(gait.lift))
     return GaitState(phases, period, gait.rate, lift, carried(gait.target), gait.apex - motion[:, None, 2], gait.hip)
@@ -161,7 +161,8 @@ def raibert(xp: Any, config: GaitConfig, gait: GaitState, velocity: Any, command
         (n, 4, 2) the footholds in the heading frame [m], and (n, 4) the heading that the trunk will have then [rad].
     """
     left = time_to_touch_down(xp, config, gait)
-    return raibert_at(xp, config, gait, (velocity + command[:, :2]) / 2, command, left)
+    nominal, heading = raibert_at(xp, config, gait, (velocity + command[:, :2]) / 2, command, left)
+    return nominal + config.capture * (velocity - command[:, :2])[:, None], heading
 
 
 def time_to_touch_down(xp: Any, config: GaitConfig, gait: GaitState) -> Any:

@@ -189,9 +189,7 @@ class LocoPpoConfig:
         init_std: standard deviation of the actions at the start, also after ``from_policy``.
         critic_warmup: in so many first updates only the critic learns: one that starts afresh beside a trained actor
             would otherwise teach it nonsense.
-        scan: whether the actor sees the height scan beside its footholds, as a learned code; the critic always does.
-        actor, critic, encoder: widths of the hidden layers.
-        code: size of the map code that the encoder makes of the height scan [paper III-A].
+        actor, critic: widths of the hidden layers; the critic sees the height scan too.
         update: whose update: rsl_rl (rsl-rl's own), fast (the same numbers with fewer waits for the device; see
             ``vinl.loco.fast_ppo``) or graphs (fast, its minibatches as CUDA graphs).
     """
@@ -209,11 +207,8 @@ class LocoPpoConfig:
     max_grad_norm: float = 1.0
     init_std: float = 1.0
     critic_warmup: int = 0
-    scan: bool = False
     actor: tuple[int, ...] = (512, 256, 128)
     critic: tuple[int, ...] = (512, 256, 128)
-    encoder: tuple[int, ...] = (128, 64)
-    code: int = 32
     update: Literal["rsl_rl", "fast", "graphs"] = "graphs"
 
     def __post_init__(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import torch
@@ -11,8 +10,11 @@ from rsl_rl.modules.distribution import GaussianDistribution
 from tensordict import TensorDict
 from torch import nn
 
-from vinl.policies.networks import MapActor, StepActor, mlp
-from vinl.robot.observation import PROPRIOCEPTION_SIZE
+from vinl.gait.observation import STEPPING_TABLE
+from vinl.policies.networks import StepActor
+
+_FIRST_WEIGHTS = 0.003
+"""Standard deviation of the last layer's weights at the start."""
 
 
 class UncheckedGaussian(GaussianDistribution):
@@ -26,84 +28,37 @@ class UncheckedGaussian(GaussianDistribution):
         return mean + self.std.detach() * torch.randn_like(mean)
 
 
-class MapModel(MLPModel):
-    """rsl-rl actor that turns the height scan into a short code before the MLP [paper III-A]; the scan is all that it
-    is given behind the proprioception.
-
-    Args:
-        proprioception: numbers before the height scan.
-        encoder: widths of the encoder's hidden layers.
-        code: size of the map code.
-        rest: as for ``MLPModel``.
-    """
-
-    def __init__(
-        self,
-        *args: Any,
-        proprioception: int = PROPRIOCEPTION_SIZE,
-        encoder: Sequence[int] = (128, 64),
-        code: int = 32,
-        **rest: Any,
-    ) -> None:
-        self._front, self._code_size = proprioception, code
-        super().__init__(*args, **rest)
-        self._encoder_sizes = (self.obs_dim - proprioception, *encoder, code)
-        self.encoder = mlp(self._encoder_sizes, nn.ReLU)
-
-    def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> torch.Tensor:
-        """Proprioception and map code, (n, proprioception + code)."""
-        full = super().get_latent(obs, masks, hidden_state)
-        return torch.cat([full[..., : self._front], self.encoder(full[..., self._front :])], -1)
-
-    def _get_latent_dim(self) -> int:
-        return self._front + self._code_size
-
-    def export(self) -> MapActor:
-        """The deterministic actor with the same weights, as policies are shipped."""
-        *hidden, actions = _widths(self)
-        scan, *encoder, code = self._encoder_sizes
-        actor = MapActor(self._front, scan, encoder, code, hidden, actions)
-        actor.load_state_dict(_shipped_names(self))
-        return actor
-
-
 class StepModel(MLPModel):
-    """rsl-rl actor that is not given the height scan: proprioception and the rows of the gait go into the MLP.
+    """rsl-rl actor that is not given the height scan: proprioception and the rows of the gait go into the MLP. What it
+    gives is added to ``policies.reference.GaitReference``, which ``LocoVecEnv`` does in training.
 
     Args:
-        proprioception: numbers before the height scan.
+        gait: fields of the ``GaitConfig``, for the exported actor.
         rest: as for ``MLPModel``.
     """
 
-    def __init__(self, *args: Any, proprioception: int = PROPRIOCEPTION_SIZE, **rest: Any) -> None:
-        self._front = proprioception
+    def __init__(self, *args: Any, gait: dict[str, Any], **rest: Any) -> None:
+        self._gait = gait
         super().__init__(*args, **rest)
+        nn.init.normal_(self.mlp[-1].weight, std=_FIRST_WEIGHTS)  # it begins by following its gait
+        nn.init.zeros_(self.mlp[-1].bias)
 
     def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> torch.Tensor:
         """Everything before the height scan."""
-        return super().get_latent(obs, masks, hidden_state)[..., : self._front]
+        return super().get_latent(obs, masks, hidden_state)[..., : STEPPING_TABLE.size]
 
     def _get_latent_dim(self) -> int:
-        return self._front
+        return STEPPING_TABLE.size
 
     def export(self) -> StepActor:
         """The deterministic actor with the same weights, as policies are shipped."""
-        *hidden, actions = _widths(self)
-        actor = StepActor(self._front, hidden, actions)
-        actor.load_state_dict(_shipped_names(self))
+        *hidden, actions = [layer.out_features for layer in self.mlp if isinstance(layer, nn.Linear)]
+        actor = StepActor(self._gait, hidden, actions)
+        weights = {k: v for k, v in self.state_dict().items() if k.startswith("mlp.")}
+        actor.load_state_dict({k.replace("mlp.", "actor.", 1): v for k, v in weights.items()})
         return actor
 
 
 def training_names(weights: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
     """The weights of a shipped actor under the names of its model for training."""
     return {name.replace("actor.", "mlp.", 1): weight for name, weight in weights.items()}
-
-
-def _shipped_names(model: nn.Module) -> dict[str, torch.Tensor]:
-    weights = {k: v for k, v in model.state_dict().items() if k.startswith(("encoder.", "mlp."))}
-    return {k.replace("mlp.", "actor.", 1): v for k, v in weights.items()}
-
-
-def _widths(model: MLPModel) -> list[int]:
-    """Outputs of the linear layers of the MLP."""
-    return [layer.out_features for layer in model.mlp if isinstance(layer, nn.Linear)]

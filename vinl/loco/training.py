@@ -11,16 +11,16 @@ import torch
 
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config, dump_config
-from vinl.gait.observation import STEPPING_TABLE
 from vinl.loco.config import LocoConfig, LocoPpoConfig
 from vinl.loco.environment import LocoEnvironment
-from vinl.loco.models import MapModel, StepModel, training_names
+from vinl.loco.models import StepModel, training_names
 from vinl.loco.runner import TrainingRunner
 from vinl.loco.vec_env import LocoVecEnv
 from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.io import save_policy
 from vinl.policies.lineage import find_commit
+from vinl.policies.reference import GaitReference
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
 
 WARMUP_RATE = 1e-3
@@ -30,10 +30,6 @@ WARMUP_RATE = 1e-3
 def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
     """Our PPO settings under rsl-rl's names."""
     p = config.ppo
-    actor: dict[str, Any] = {"class_name": "vinl.loco.models:StepModel"}
-    if p.scan:
-        actor = {"class_name": "vinl.loco.models:MapModel", "encoder": list(p.encoder), "code": p.code}
-    actor["proprioception"] = STEPPING_TABLE.size
     update: dict[str, Any] = {"class_name": "PPO"}
     if p.update != "rsl_rl":
         update = {"class_name": "vinl.loco.fast_ppo:FastPPO", "graphs": p.update == "graphs"}
@@ -41,7 +37,8 @@ def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
         "num_steps_per_env": p.steps,
         "obs_groups": {"actor": ["policy"], "critic": ["critic"]},
         "actor": {
-            **actor,
+            "class_name": "vinl.loco.models:StepModel",
+            "gait": asdict(config.gait),
             "hidden_dims": list(p.actor),
             "activation": "elu",
             "distribution_cfg": {"class_name": "vinl.loco.models:UncheckedGaussian", "init_std": p.init_std},
@@ -130,10 +127,10 @@ def train_locomotor(
     torch.manual_seed(config.seed)
     torch.backends.cuda.matmul.allow_tf32 = True
     environment = LocoEnvironment(config)
-    env = LocoVecEnv(environment, device)
+    env = LocoVecEnv(environment, device, GaitReference(config.gait))
     commit = find_commit()
 
-    def export(model: MapModel | StepModel, samples: int) -> None:
+    def export(model: StepModel, samples: int) -> None:
         actor = model.export()
         card = make_card(name or run.path.name, config, actor.describe(), samples, commit, origin)
         save_policy(run.policy, actor, card)
@@ -179,4 +176,4 @@ def make_card(
     action = {**describe_action(), "kp": config.kp, "kd": config.kd}
     training = {**dump_config(config), **({"origin": origin} if origin else {})}
     learned = {"seed": config.seed, "samples": samples, "commit": commit}
-    return locomotion_card(name, network, action, config.ppo.scan, asdict(config.gait), training=training, **learned)
+    return locomotion_card(name, network, action, False, asdict(config.gait), training=training, **learned)

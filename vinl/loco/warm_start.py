@@ -9,13 +9,12 @@ from typing import Any
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
-from vinl.gait.observation import STEPPING_TABLE
 from vinl.loco.config import LocoConfig
 from vinl.policies.card import PolicyCard, find_gait
 from vinl.policies.identity import digest_tensors
 from vinl.policies.io import find_policy, load_policy
 from vinl.policies.lineage import trace_lineage
-from vinl.policies.networks import MapActor, StepActor
+from vinl.policies.networks import PolicyNetwork, StepActor
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
 
 
@@ -70,16 +69,15 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
         InputError: no such policy, one of another kind, of other sizes, with another gait or with other joint gains.
     """
     policy = load_policy(name_or_path)
-    network, p = policy.network, config.ppo
-    sizes: dict[str, Any] = {"proprioception": STEPPING_TABLE.size, "actor": p.actor}
-    fresh = MapActor(encoder=p.encoder, code=p.code, **sizes) if p.scan else StepActor(**sizes)
-    given, wanted = network.describe(), fresh.describe()
+    network = policy.network
+    # the gait is looked at by itself: one without a map has the same weights
+    given, wanted = (_without_gait(x) for x in (network, StepActor(actor=config.ppo.actor)))
     if policy.card.kind == "locomotion":
         _check_gait(name_or_path, policy.card, config)
     if given != wanted:
         raise InputError(
             f"--from {name_or_path}: its network {_list(given)} is not that of this training "
-            f"{_list(wanted)}; set ppo.scan, ppo.encoder, ppo.code and ppo.actor to its own, or give another policy"
+            f"{_list(wanted)}; set ppo.actor to its own, or give another policy"
         )
     check_gains(name_or_path, policy.card, config)
     actor = {name: weight.clone() for name, weight in network.state_dict().items()}
@@ -170,6 +168,10 @@ def _load_critic(name_or_path: str, config: LocoConfig) -> dict[str, Tensor] | N
     if widths != (*config.ppo.critic, 1):
         return None
     return critic
+
+
+def _without_gait(network: PolicyNetwork) -> dict[str, object]:
+    return {name: value for name, value in network.describe().items() if name != "gait"}
 
 
 def _list(description: dict[str, object]) -> str:

@@ -13,7 +13,10 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
-from vinl.config.loader import closest
+from vinl.config.loader import build_config, closest
+from vinl.gait.config import GaitConfig
+from vinl.gait.observation import STEPPING_TABLE
+from vinl.policies.reference import GaitReference
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE
 
 NETWORKS: dict[str, type[PolicyNetwork]] = {}
@@ -114,21 +117,26 @@ class BlindActor(PolicyNetwork):
 
 
 class StepActor(PolicyNetwork):
-    """The deterministic locomotion actor of planned footholds: proprioception and the rows of the gait to an action.
+    """The deterministic locomotion actor of planned footholds: the motion that its gait asks for, and what a network
+    adds to it.
 
     What it knows of the ground is where its feet shall go. Parameters are named ``actor.*``.
     """
 
-    def __init__(self, proprioception: int, actor: Sequence[int] = (512, 256, 128), actions: int = 12) -> None:
-        """``proprioception`` counts the rows of the gait too; ``actor`` are the widths of the hidden layers."""
+    def __init__(
+        self, gait: dict[str, Any] | None = None, actor: Sequence[int] = (512, 256, 128), actions: int = 12
+    ) -> None:
+        """``gait`` are the fields of its ``GaitConfig``, ``actor`` the widths of the hidden layers."""
         super().__init__()
+        gait = dict(gait or {})
         self.keep_arguments(locals())
-        self.observation_size, self.action_size = proprioception, actions
-        self.actor = mlp([proprioception, *actor, actions], nn.ELU)
+        self.observation_size, self.action_size = STEPPING_TABLE.size, actions
+        self.reference = GaitReference(build_config(GaitConfig, gait, source="network: gait"))
+        self.actor = mlp([self.observation_size, *actor, actions], nn.ELU)
 
     def forward(self, observation: Float[Tensor, "n observation"]) -> Float[Tensor, "n actions"]:
         """Scaled observations in the order of ``gait.observation.STEPPING_TABLE`` to actions."""
-        return self.actor(observation)
+        return self.reference(observation) + self.actor(observation)
 
 
 def mlp(sizes: Sequence[int], activation: Callable[[], nn.Module]) -> nn.Sequential:

@@ -25,6 +25,7 @@ from vinl.gait.state import GaitState, aim, start_gait, swings, tick
 from vinl.policies.depth_memory import DepthMemory, State
 from vinl.policies.elevation_map import ElevationMap, MapState
 from vinl.policies.networks import PolicyNetwork, mlp
+from vinl.policies.reference import GaitReference
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, FOOT_RADIUS
 from vinl.robot.cameras import Camera
 
@@ -93,6 +94,7 @@ class SteppingActor(PolicyNetwork):
         self.image = None if eye is None else (eye.height, eye.width)
         self.elevation = None if eye is None else ElevationMap(eye)
         self.velocity = nn.Linear(hidden, 3)
+        self.reference = GaitReference(self.gait)
         self.actor = mlp([STEPPING_TABLE.size, *actor, actions], nn.ELU)
         nn.init.normal_(self.velocity.weight, std=0.01)  # it begins with the belief that it stands
         nn.init.zeros_(self.velocity.bias)
@@ -223,7 +225,8 @@ class SteppingActor(PolicyNetwork):
         gait = aim(torch, self.gait, gait, plan, level, command, feet)
         rows = gait_rows(torch, self.gait, gait, feet) * self.rows_scale
         scale = STEPPING_TABLE.terms[0].scale[0]
-        return self.actor(torch.cat([said.velocity * scale, vector, rows], 1)), gait
+        observed = torch.cat([said.velocity * scale, vector, rows], 1)
+        return self.reference(observed) + self.actor(observed), gait
 
     def forward(
         self,
