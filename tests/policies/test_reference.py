@@ -65,14 +65,14 @@ def test_a_robot_in_a_mirror_moves_as_in_a_mirror() -> None:
     place = STEPPING_TABLE.place
     seen = 0.1 * torch.randn(6, STEPPING_TABLE.size)
     seen[:, place("projected_gravity")] = torch.tensor([0.05, -0.1, -1.0])
-    for name in ("swing", "swing_ahead"):
+    for name in ("swing", "swing_ahead", "load_ahead"):
         seen[:, place(name)] = torch.tensor([1.0, 0, 0, 1])
     other = seen.clone()
     signs = {"base_linear_velocity": (1, -1, 1), "base_angular_velocity": (-1, 1, -1), "projected_gravity": (1, -1, 1)}
     for name, sign in {**signs, "command": (1, -1, -1)}.items():
         other[:, place(name)] = seen[:, place(name)] * torch.tensor(sign)
     of_legs = {"joint_position": (-1, 1, 1), "path_error": (1, -1, 1), "path_ahead": (1, -1, 1), "swing": (1,)}
-    for name, sign in {**of_legs, "swing_ahead": (1,)}.items():
+    for name, sign in {**of_legs, "swing_ahead": (1,), "load_ahead": (1,)}.items():
         each = seen[:, place(name)].reshape(6, 4, -1)
         other[:, place(name)] = (each[:, MIRRORED] * torch.tensor(sign)).flatten(1)
     reference = GaitReference(GaitConfig())

@@ -16,15 +16,21 @@ from vinl.gait.leg import leg_angles, leg_jacobian
 from vinl.gait.observation import STEPPING_TABLE
 from vinl.gait.path import LOOK_AHEAD
 from vinl.gait.proprioception import feet_in_trunk, heading_axes, into_heading_frame
-from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, FOOT_RADIUS, KP, MASS
+from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, FOOT_RADIUS, KD, KP, MASS
 
 _GRAVITY = 9.81
 
-_UPRIGHT = 0.7, 0.06
+_UPRIGHT = 1.0, 0.1
 """Legs that stand take back this fraction of a tilt, and of what it grows in this time [s]."""
 
 _PUSH, _TURN = 0.2, 0.35
 """They move the trunk by what it misses of its velocity in so much time [s], along and in turning."""
+
+_LEAD = KD / KP
+"""What dampers hold back: legs that move are commanded so much ahead [s]."""
+
+_PRESS = 0.03
+"""A foot that comes down is commanded this far below its foothold [m]: it stands when the clock says so."""
 
 _SOFT = 1e-3
 """Where feet that stand cannot carry the weight without a moment (two on a line), they come this near [m^2]."""
@@ -43,7 +49,7 @@ class GaitReference(nn.Module):
     def __init__(self, config: GaitConfig) -> None:
         super().__init__()
         self._hip = config.hip_height
-        self.upright, self.push, self.turning, self.sag = _UPRIGHT, _PUSH, _TURN, 1.0
+        self.upright, self.push, self.turning, self.lead, self.press = _UPRIGHT, _PUSH, _TURN, _LEAD, _PRESS
         self._places = {term.name: STEPPING_TABLE.place(term.name) for term in STEPPING_TABLE}
         self.register_buffer("scale", torch.from_numpy(STEPPING_TABLE.scale), persistent=False)
         self.register_buffer("pose", torch.tensor(DEFAULT_POSE, dtype=torch.float32, device="cpu"), persistent=False)
@@ -71,6 +77,8 @@ class GaitReference(nn.Module):
         late = LOOK_AHEAD
         path = feet + row("path_ahead").reshape(n, 4, 3)
         level = torch.cat([velocity[:, :2], torch.zeros_like(velocity[:, 2:])], 1)
+        down = (~stands & loaded).float() * self.press
+        path = torch.cat([path[..., :2], path[..., 2:] - down[..., None]], -1)
         path = _turned(path - late * level[:, None], -late * turning[:, 2])
         path = _in_trunk(path, roll + 0.5 * late * turning[:, 0], pitch + 0.5 * late * turning[:, 1])
 
@@ -78,15 +86,15 @@ class GaitReference(nn.Module):
         standing = stands.float()
         floor = (standing * feet[..., 2]).sum(1) / standing.sum(1).clip(min=1.0) - FOOT_RADIUS
         lack = self._hip + row("hip")[:, 0] + floor
-        shift = self.push * (command[:, :2] - velocity[:, :2])
-        under = torch.cat([feet[..., :2] - shift[:, None], feet[..., 2:] - self.sag * lack[:, None, None]], -1)
+        shift = self.lead * command[:, :2] + self.push * (command[:, :2] - velocity[:, :2])
+        under = torch.cat([feet[..., :2] - shift[:, None], feet[..., 2:] - lack[:, None, None]], -1)
         under = _turned(under, -self.turning * (command[:, 2] - turning[:, 2]))
         kept, lead = 1.0 - self.upright[0], self.upright[1]
         under = _in_trunk(under, kept * roll - lead * turning[:, 0], kept * pitch - lead * turning[:, 1])
 
         moves = (~(stands & loaded))[..., None]
         target = leg_angles(torch, torch.where(moves, path, under))
-        push = carry_weight(feet, loaded.float())
+        push = carry_weight(feet, row("load_ahead"))
         up = -gravity / gravity.norm(dim=1, keepdim=True).clip(min=1e-6)
         force = push[..., None] * up[:, None]  # of the ground on each foot, in the trunk's frame
         torque = -(leg_jacobian(torch, joints) * force[..., None]).sum(-2)
