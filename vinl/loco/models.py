@@ -40,8 +40,10 @@ class StepModel(MLPModel):
     def __init__(self, *args: Any, gait: dict[str, Any], **rest: Any) -> None:
         self._gait = gait
         super().__init__(*args, **rest)
-        nn.init.normal_(self.mlp[-1].weight, std=_FIRST_WEIGHTS)  # it begins by following its gait
-        nn.init.zeros_(self.mlp[-1].bias)
+        last = self.mlp[-1]
+        assert isinstance(last, nn.Linear)
+        nn.init.normal_(last.weight, std=_FIRST_WEIGHTS)  # it begins by following its gait
+        nn.init.zeros_(last.bias)
 
     def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> torch.Tensor:
         """Everything before the height scan."""
