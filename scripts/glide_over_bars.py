@@ -10,6 +10,7 @@ import sys
 
 import numpy as np
 
+from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.gait.config import GaitConfig
 from vinl.gait.gliding import glide
@@ -17,7 +18,14 @@ from vinl.gait.gliding import glide
 
 def main() -> None:
     """Print the table."""
-    config = build_config(GaitConfig, {}, sys.argv[1:], source="gait")
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        print(__doc__)
+        return
+    try:
+        config = build_config(GaitConfig, {}, sys.argv[1:], source="gait")
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
     print("speed [m/s]  bar [m]  clean  clean and in reach")
     for speed in (0.3, 0.5, 0.7):
         for height in (0.05, 0.10, 0.15, 0.20):
