@@ -14,11 +14,8 @@ from jaxtyping import Bool, Float
 from vinl.chain.metrics import BOOTSTRAP, wilson_interval
 from vinl.config.output import round_numbers
 from vinl.courses.block_contacts import BINS, HEIGHT_EDGES, Strain
-from vinl.robot.aliengo import CONTROL_DT, HIPS, MASS, foot_positions
+from vinl.robot.aliengo import CONTROL_DT, GRAVITY, HIPS, MASS, foot_positions
 from vinl.robot.rotation import matrix_of
-
-GRAVITY = 9.81
-"""[m/s2]."""
 
 CLOSE = 0.06
 """Middles of two feet nearer than this [m] are as good as a foot on a foot, whose radius is 0.0265 m."""

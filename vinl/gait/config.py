@@ -59,7 +59,7 @@ class GaitConfig:
             raise InputError(f"gait.hip_height must lie between {2 * FOOT_RADIUS} and 0.5 m, got {self.hip_height}")
         if not self.hip_height <= self.highest_hip < 0.5:
             raise InputError(f"gait.highest_hip must lie between hip_height and 0.5 m, got {self.highest_hip}")
-        if min(self.edge, self.shank) < 0:
-            raise InputError("gait.edge and gait.shank must not be negative")
+        if min(self.edge, self.shank, self.capture) < 0:
+            raise InputError("gait.edge, gait.shank and gait.capture must not be negative")
         if not 0 <= self.modulate < 1:
             raise InputError(f"gait.modulate must lie in [0, 1), got {self.modulate}")

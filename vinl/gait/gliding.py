@@ -9,7 +9,7 @@ import numpy as np
 from vinl.gait.config import GaitConfig
 from vinl.gait.footholds import plan_footholds
 from vinl.gait.ground_view import FieldView, build_ground_map
-from vinl.gait.leg import knee_from_foot
+from vinl.gait.leg import LONGEST, knee_from_foot
 from vinl.gait.path import swing_path
 from vinl.gait.state import aim, stance_places, start_gait, swings, tick
 from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS, HIPS
@@ -17,7 +17,6 @@ from vinl.world.boxes import Boxes
 from vinl.world.grid import BLOCK, GridFrame, flat_field, raise_boxes
 
 _SHANK_RADIUS = 0.0145
-_LONGEST = 0.488
 
 
 class Glide(NamedTuple):
@@ -57,7 +56,7 @@ def glide(config: GaitConfig, height: float, speed: float, robots: int, depth: f
         feet[..., 2] = np.where(swings(np, config, gait), feet[..., 2], FOOT_RADIUS - qpos[:, 2:3])
         ahead = feet[..., 0] - HIPS[:, 0]
         near = np.abs(qpos[:, 0]) < 1.1
-        in_reach &= ~near | (np.hypot(ahead, feet[..., 2]) < _LONGEST).all(1)
+        in_reach &= ~near | (np.hypot(ahead, feet[..., 2]) < LONGEST).all(1)
         foot |= (view.clearance(feet) < FOOT_RADIUS - 0.002).any(1)
         back, up = knee_from_foot(np, ahead, -feet[..., 2])
         line = np.linspace(0.1, 1.0, 8)[:, None, None]

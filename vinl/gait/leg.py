@@ -10,7 +10,7 @@ import numpy as np
 from vinl.gait.arrays import constant
 from vinl.robot.aliengo import HIPS, LINK, THIGH_ASIDE
 
-_SHORTEST, _LONGEST = 0.12, 0.488
+SHORTEST, LONGEST = 0.12, 0.488
 """Lengths of a leg that joint angles are given for, from thigh joint to foot [m]; the calf's limits are just beyond."""
 
 REACH = 0.48
@@ -55,7 +55,7 @@ def leg_angles(xp: Any, feet: Any) -> Any:
     aside = constant(xp, THIGH_ASIDE.astype(np.float32), feet)
     below = xp.sqrt(xp.clip(y**2 + z**2 - aside**2, 1e-4, None))
     hip = xp.arctan2(z * aside + y * below, y * aside - z * below)
-    length = xp.clip(xp.sqrt(x**2 + below**2), _SHORTEST, _LONGEST)
+    length = xp.clip(xp.sqrt(x**2 + below**2), SHORTEST, LONGEST)
     calf = -2 * xp.arccos(length / (2 * LINK))
     return xp.stack([hip, xp.arctan2(-x, below) - calf / 2, calf], -1).reshape(len(feet), 12)
 

@@ -34,12 +34,14 @@ heading frame; its phase; whether it swings, now and ``LOOK_AHEAD`` later, and w
 bears weight ``LOAD_AHEAD`` later; how much faster its clock runs while it
 stands; and how far the hips should rise above their usual height."""
 
-LOOK_AHEAD = KD / KP + CONTROL_DT / 2 + 0.015
-"""Legs follow their targets so much later [s]: damping over stiffness, half a control step, and the mean latency of the
-training. Commanded where its path is then, a foot in the air keeps to it within 1.5 cm."""
+_DELAY = CONTROL_DT / 2 + 0.015
+"""From an observation to the torque that answers it [s]: half a control step, and the mean latency of the training."""
 
-LOAD_AHEAD = CONTROL_DT / 2 + 0.015 + 0.01
-"""Torques act sooner than motions [s]: after half a control step and the latency; and a foot that comes down needs
+LOOK_AHEAD = KD / KP + _DELAY
+"""Legs follow their targets so much later [s]: damping over stiffness, and the delay."""
+
+LOAD_AHEAD = _DELAY + 0.01
+"""Torques act sooner than motions [s]: after the delay; and a foot that comes down needs
 some of its weight at once. A leg that is given its weight 75 ms early slaps down 4 cm short of its foothold."""
 
 GAIT_SIZE = sum(size for _, size, _, _ in GAIT_TERMS)
@@ -79,6 +81,12 @@ def _since_lift_off(xp: Any, config: GaitConfig, gait: GaitState, later: float) 
     return xp.where(swinging, phases, 0 * phases) + later / gait.period[:, None] - stands, fraction
 
 
+def _swings(xp: Any, config: GaitConfig, gait: GaitState, later: float) -> Any:
+    """(n, 4) which feet will be in the air then."""
+    since, fraction = _since_lift_off(xp, config, gait, later)
+    return (since > 0) & (since < fraction)
+
+
 def gait_rows(xp: Any, config: GaitConfig, gait: GaitState, feet: Any) -> Any:
     """(n, GAIT_SIZE) what a policy observes of its gait, in SI units, in the order of ``GAIT_TERMS``.
 
@@ -90,18 +98,17 @@ def gait_rows(xp: Any, config: GaitConfig, gait: GaitState, feet: Any) -> Any:
     swinging = phases < swing_fraction(xp, config, gait.period)[:, None]
     error = swing_path(xp, config, gait, feet, CONTROL_DT) - feet
     apex = xp.where(swinging, gait.apex - feet[..., 2], 0 * feet[..., 2])
-    since, fraction = _since_lift_off(xp, config, gait, LOOK_AHEAD)
-    angle = 2 * math.pi * phases
-    soon = _since_lift_off(xp, config, gait, LOAD_AHEAD)[0]
+    angle, none = 2 * math.pi * phases, 0 * apex
+    swings_then, unloaded = (_swings(xp, config, gait, later) for later in (LOOK_AHEAD, LOAD_AHEAD))
     parts = [
         xp.clip(error, -0.5, 0.5).reshape(n, 12),
         xp.clip(swing_path(xp, config, gait, feet, LOOK_AHEAD) - feet, -0.5, 0.5).reshape(n, 12),
         xp.clip((gait.target - feet)[..., :2], -1.0, 1.0).reshape(n, 8),
         xp.clip(apex, -0.5, 0.5),
         xp.stack([xp.sin(angle), xp.cos(angle)], -1).reshape(n, 8),
-        xp.where(swinging, 1.0 + 0 * apex, 0 * apex),
-        xp.where((since > 0) & (since < fraction), 1.0 + 0 * apex, 0 * apex),
-        xp.where((soon > 0) & (soon < fraction), 0 * apex, 1.0 + 0 * apex),
+        xp.where(swinging, none + 1.0, none),
+        xp.where(swings_then, none + 1.0, none),
+        xp.where(unloaded, none, none + 1.0),
         gait.rate - 1.0,
         (gait.hip - config.hip_height)[:, None],
     ]

@@ -16,12 +16,10 @@ from vinl.gait.leg import leg_angles, leg_jacobian
 from vinl.gait.observation import STEPPING_TABLE
 from vinl.gait.path import LOOK_AHEAD
 from vinl.gait.proprioception import feet_in_trunk, heading_axes, into_heading_frame
-from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, FOOT_RADIUS, KD, KP, MASS
+from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, FOOT_RADIUS, GRAVITY, KD, KP, MASS
 
-_GRAVITY = 9.81
-
-_UPRIGHT = 1.0, 0.1
-"""Legs that stand take back this fraction of a tilt, and of what it grows in this time [s]."""
+_UPRIGHT = 0.1
+"""Legs that stand take back the whole tilt, and what it grows in this time [s]."""
 
 _PUSH, _TURN = 0.2, 0.35
 """They move the trunk by what it misses of its velocity in so much time [s], along and in turning."""
@@ -50,7 +48,6 @@ class GaitReference(nn.Module):
     def __init__(self, config: GaitConfig) -> None:
         super().__init__()
         self._hip = config.hip_height
-        self.upright, self.push, self.turning, self.lead, self.press = _UPRIGHT, _PUSH, _TURN, _LEAD, _PRESS
         self._places = {term.name: STEPPING_TABLE.place(term.name) for term in STEPPING_TABLE}
         self.register_buffer("scale", torch.from_numpy(STEPPING_TABLE.scale), persistent=False)
         self.register_buffer("pose", torch.tensor(DEFAULT_POSE, dtype=torch.float32, device="cpu"), persistent=False)
@@ -78,7 +75,7 @@ class GaitReference(nn.Module):
         late = LOOK_AHEAD
         path = feet + row("path_ahead").reshape(n, 4, 3)
         level = torch.cat([velocity[:, :2], torch.zeros_like(velocity[:, 2:])], 1)
-        down = (~stands & loaded).float() * self.press
+        down = (~stands & loaded).float() * _PRESS
         path = torch.cat([path[..., :2], path[..., 2:] - down[..., None]], -1)
         path = _turned(path - late * level[:, None], -late * turning[:, 2])
         path = _in_trunk(path, roll + 0.5 * late * turning[:, 0], pitch + 0.5 * late * turning[:, 1])
@@ -87,11 +84,10 @@ class GaitReference(nn.Module):
         standing = stands.float()
         floor = (standing * feet[..., 2]).sum(1) / standing.sum(1).clip(min=1.0) - FOOT_RADIUS
         lack = self._hip + row("hip")[:, 0] + floor
-        shift = self.lead * command[:, :2] + self.push * (command[:, :2] - velocity[:, :2])
+        shift = _LEAD * command[:, :2] + _PUSH * (command[:, :2] - velocity[:, :2])
         under = torch.cat([feet[..., :2] - shift[:, None], feet[..., 2:] - lack[:, None, None]], -1)
-        under = _turned(under, -self.turning * (command[:, 2] - turning[:, 2]))
-        kept, lead = 1.0 - self.upright[0], self.upright[1]
-        under = _in_trunk(under, kept * roll - lead * turning[:, 0], kept * pitch - lead * turning[:, 1])
+        under = _turned(under, -_TURN * (command[:, 2] - turning[:, 2]))
+        under = _in_trunk(under, -_UPRIGHT * turning[:, 0], -_UPRIGHT * turning[:, 1])  # of a trunk that is upright
 
         moves = (~(stands & loaded))[..., None]
         target = leg_angles(torch, torch.where(moves, path, under))
@@ -114,9 +110,9 @@ def carry_weight(feet: Float[Tensor, "n 4 3"], loaded: Float[Tensor, "n 4"]) -> 
     n, sx, sy = loaded.sum(1) + _SOFT, x.sum(1), y.sum(1)
     xx, yy, xy = (x * x).sum(1) + _SOFT, (y * y).sum(1) + _SOFT, (x * y).sum(1)
     a, b, c = xx * yy - xy * xy, xy * sy - sx * yy, sx * xy - xx * sy
-    scale = MASS * _GRAVITY / (n * a + sx * b + sy * c)
+    scale = MASS * GRAVITY / (n * a + sx * b + sy * c)
     share = (a * scale)[:, None] * loaded + (b * scale)[:, None] * x + (c * scale)[:, None] * y
-    return share.clip(0.0, MASS * _GRAVITY)
+    return share.clip(0.0, MASS * GRAVITY)
 
 
 def _turned(points: Float[Tensor, "n 4 3"], angle: Float[Tensor, " n"]) -> Float[Tensor, "n 4 3"]:

@@ -26,6 +26,9 @@ KD = 2.0
 ACTION_SCALE = 0.25
 """Joint target = default pose + scale * action [rad] [ViNL config]."""
 
+GRAVITY = 9.81
+"""[m/s2]."""
+
 MASS = 24.937
 """Of the whole robot [kg] [Unitree aliengo.urdf]."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, TypeVar
 
@@ -17,7 +18,7 @@ FARTHEST = 1e6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class _Table:
+class _Table(ABC):
     """A thing a row, in columns that ``WIDTH`` counts; refuses rows that no thing can have."""
 
     rows: Float[np.ndarray, "n k"]
@@ -50,9 +51,9 @@ class _Table:
         return type(self)(np.concatenate([self.rows, other.rows]))
 
     @staticmethod
+    @abstractmethod
     def _sizes(rows: np.ndarray) -> tuple[np.ndarray, ...]:
         """Length, width and height [m]."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False, repr=False)
