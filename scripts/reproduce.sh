@@ -19,11 +19,11 @@ train() {  # name, then what a new run is started with
   fi
 }
 
-train rough --stage 1                                                          #  39 M   2.5 min
-train teacher --stage 2 --from "$runs/rough"                                   # 147 M   9.5 min
-train student --stage 3 --from "$runs/teacher"                                 #  20 M   4.7 min
+train rough --stage 1                                                          #  25 M   1.6 min
+train teacher --stage 2 --from "$runs/rough"                                   # 128 M   8.2 min
+train student --stage 3 --from "$runs/teacher"                                 #  15 M   3.5 min
 
 # baselines [paper IV-B]: the same samples in each stage
-train blind --config loco/blind --from "$runs/rough"                           # 147 M   9.5 min
-train no_pretraining --config loco/no_pretraining                              # 147 M   9.5 min
-train mlp --config loco/mlp --from "$runs/teacher"                             #  20 M   4.7 min
+train blind --config loco/blind --from "$runs/rough"                           # 128 M   8.2 min
+train no_pretraining --config loco/no_pretraining                              # 128 M   8.2 min
+train mlp --config loco/mlp --from "$runs/teacher"                             #  15 M   3.5 min

@@ -69,7 +69,7 @@ def test_a_robot_in_a_mirror_moves_as_in_a_mirror() -> None:
         seen[:, place(name)] = torch.tensor([1.0, 0, 0, 1])
     other = seen.clone()
     signs = {"base_linear_velocity": (1, -1, 1), "base_angular_velocity": (-1, 1, -1), "projected_gravity": (1, -1, 1)}
-    for name, sign in {**signs, "command": (1, -1, -1)}.items():
+    for name, sign in {**signs, "command": (1, -1, -1), "missed": (1, -1)}.items():
         other[:, place(name)] = seen[:, place(name)] * torch.tensor(sign)
     of_legs = {"joint_position": (-1, 1, 1), "path_error": (1, -1, 1), "path_ahead": (1, -1, 1), "swing": (1,)}
     for name, sign in {**of_legs, "swing_ahead": (1,), "load_ahead": (1,)}.items():

@@ -169,7 +169,7 @@ class GaitReader:
 
     def read(
         self, qpos: Float[np.ndarray, "n 19"], qvel: Float[np.ndarray, "n 18"], command: Float[np.ndarray, "n 3"]
-    ) -> Float[np.ndarray, "n 61"]:
+    ) -> Float[np.ndarray, "n 63"]:
         """One control step on: the rows of the gait, scaled, in the order of ``GAIT_ROWS``."""
         feet = feet_in_heading_frame(np, qpos)
         start = start_gait(np, self.config, feet)

@@ -37,7 +37,7 @@ class GaitConfig:
     swing_time: float = 0.3
     swing_fraction: float = 0.3
     stance: tuple[float, float] = (0.24, 0.15)
-    hip_height: float = 0.43
+    hip_height: float = 0.42
     highest_hip: float = 0.47
     lift: float = 0.08
     edge: float = 0.035

@@ -20,7 +20,7 @@ GAIT_ROWS = tuple(
 _SCALE = ObservationTable(GAIT_ROWS).scale
 
 STEPPING_TABLE = ObservationTable((*PROPRIOCEPTION.terms, *GAIT_ROWS))
-"""What an actor observes whose footholds come from a map: 48 numbers of the robot's own and 61 of its gait."""
+"""What an actor observes whose footholds come from a map: 48 numbers of the robot's own and 63 of its gait."""
 
 STEPPING_MAP_TABLE = ObservationTable((*STEPPING_TABLE.terms, HEIGHT_SCAN))
 """The same, and the height scan: for an actor with a learned code beside the footholds, and for every critic."""
@@ -32,7 +32,7 @@ assert PROPRIOCEPTION.terms[0].name == "base_linear_velocity"
 
 
 def observe_gait(xp: Any, config: GaitConfig, gait: GaitState, feet: Any) -> Any:
-    """(n, 61) the rows of the gait as a policy observes them, scaled; arguments as for ``path.gait_rows``."""
+    """(n, 63) the rows of the gait as a policy observes them, scaled; arguments as for ``path.gait_rows``."""
     rows = gait_rows(xp, config, gait, feet)
     return xp.clip(rows * constant(xp, _SCALE, rows), -CLIP, CLIP)
 

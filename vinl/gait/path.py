@@ -10,8 +10,12 @@ from vinl.gait.config import GaitConfig
 from vinl.gait.state import GaitState
 from vinl.robot.aliengo import CONTROL_DT, KD, KP
 
-_WAIT = 0.12
-"""At both ends of a swing the foot moves up or down alone, for this fraction of it: the shank follows the foot."""
+_WAIT, _SETTLE = 0.12, 0.2
+"""At the beginning and at the end of a swing the foot moves up or down alone, for these fractions of it: the shank
+follows the foot, and a foot lags behind its path."""
+
+DRAW = 0.08
+"""A foot draws back by this fraction of its stride as it takes its load: its path ends so far beyond its foothold."""
 
 _STEEP = 0.6
 """The height of the path is sin(pi s) to this power: at a tenth of the swing it is at half of its apex."""
@@ -27,12 +31,13 @@ GAIT_TERMS: tuple[tuple[str, int, float, str], ...] = (
     ("load_ahead", 4, 1.0, "1"),
     ("rate", 4, 3.0, "1"),
     ("hip", 1, 20.0, "m"),
+    ("missed", 2, 10.0, "m"),
 )
 """Name, size, scale and unit of what ``gait_rows`` gives, in its order: from each foot to the next point of its path
 (x, y, z), to where the path is ``LOOK_AHEAD`` later, to its foothold (x, y) and to the height of its apex, all in the
 heading frame; its phase; whether it swings, now and ``LOOK_AHEAD`` later, and whether it
 bears weight ``LOAD_AHEAD`` later; how much faster its clock runs while it
-stands; and how far the hips should rise above their usual height."""
+stands; how far the hips should rise above their usual height; and how far the trunk is behind its commands."""
 
 _DELAY = CONTROL_DT / 2 + 0.015
 """From an observation to the torque that answers it [s]: half a control step, and the mean latency of the training."""
@@ -47,7 +52,7 @@ some of its weight at once. A leg that is given its weight 75 ms early slaps dow
 GAIT_SIZE = sum(size for _, size, _, _ in GAIT_TERMS)
 
 
-def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: float = 0.0) -> Any:
+def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: float = 0.0, draw: float = DRAW) -> Any:
     """Where each foot should be.
 
     Args:
@@ -56,6 +61,7 @@ def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: f
         feet: (n, 4, 3) middles of the feet in the heading frame [m]; a foot that stands should be where it is.
         later: how far ahead on the path to look [s]; past its touch-down a foot is at its foothold, and one that has
             lifted off by then is on its way there from where it stands.
+        draw: by which fraction of its stride a path ends beyond its foothold; 0 for feet that do not draw back.
 
     Returns:
         (n, 4, 3) [m].
@@ -64,9 +70,10 @@ def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: f
     swinging = gait.phases < fraction
     s = xp.clip(since / fraction, 0.0, 1.0)
     lift = xp.where(swinging[..., None], gait.lift, feet)
-    forth = xp.clip((s - _WAIT) / (1 - 2 * _WAIT), 0.0, 1.0)
+    forth = xp.clip((s - _WAIT) / (1 - _WAIT - _SETTLE), 0.0, 1.0)
     forth = (0.5 - 0.5 * xp.cos(math.pi * forth))[..., None]
-    straight = lift + (gait.target - lift) * forth
+    beyond = xp.concatenate([(gait.target - lift)[..., :2] * (1 + draw), (gait.target - lift)[..., 2:]], -1)
+    straight = lift + beyond * forth
     bell = (xp.sin(math.pi * s) + 1e-6) ** _STEEP  # s = 1 gives a sine just below 0 in float32
     height = straight[..., 2] + (gait.apex - straight[..., 2]) * bell
     path = xp.concatenate([straight[..., :2], height[..., None]], -1)
@@ -111,5 +118,6 @@ def gait_rows(xp: Any, config: GaitConfig, gait: GaitState, feet: Any) -> Any:
         xp.where(unloaded, none, none + 1.0),
         gait.rate - 1.0,
         (gait.hip - config.hip_height)[:, None],
+        gait.missed,
     ]
     return xp.concatenate(parts, -1)

@@ -31,6 +31,10 @@ _OVER = 0.05
 """A knee under the hip passes this far above a block [m]."""
 
 
+_MISSED = 0.12
+"""A trunk need not catch up with more than this [m]: it may have been held up."""
+
+
 class GaitState(NamedTuple):
     """One row a robot; legs in the order of ``LEGS``.
 
@@ -42,6 +46,7 @@ class GaitState(NamedTuple):
         target: (n, 4, 3) where it comes down next [m]; the middle of the foot.
         apex: (n, 4) height of its path's highest point [m].
         hip: (n,) how high above the ground the hips should be [m].
+        missed: (n, 2) how far, forward and left, the trunk has fallen behind its commands [m], up to ``_MISSED``.
     """
 
     phases: Any
@@ -51,6 +56,7 @@ class GaitState(NamedTuple):
     target: Any
     apex: Any
     hip: Any
+    missed: Any
 
 
 class Plan(NamedTuple):
@@ -74,9 +80,8 @@ def start_gait(xp: Any, config: GaitConfig, feet: Any) -> GaitState:
     still = 0 * feet[..., 0]
     period = wanted_period(xp, config, still[:, :3])
     phases = (START_PHASE + constant(xp, OFFSETS, feet) + still) % 1.0
-    return GaitState(
-        phases, period, still + 1.0, feet, feet, feet[..., 2] + config.lift, period * 0 + config.hip_height
-    )
+    apex, hip = feet[..., 2] + config.lift, period * 0 + config.hip_height
+    return GaitState(phases, period, still + 1.0, feet, feet, apex, hip, still[:, :2])
 
 
 def feet_in_heading_frame(xp: Any, qpos: Any) -> Any:
@@ -146,7 +151,9 @@ def tick(xp: Any, config: GaitConfig, gait: GaitState, motion: Any, command: Any
     phases = xp.where(rests[:, None], xp.clip(gait.phases, None, START_PHASE), ran)
     leaves = (phases < gait.phases)[..., None]  # has passed 1
     lift = xp.where(leaves, feet, carried(gait.lift))
-    return GaitState(phases, period, gait.rate, lift, carried(gait.target), gait.apex - motion[:, None, 2], gait.hip)
+    apex = gait.apex - motion[:, None, 2]
+    missed = turn(xp, -motion[:, 3], gait.missed)
+    return GaitState(phases, period, gait.rate, lift, carried(gait.target), apex, gait.hip, missed)
 
 
 def raibert(xp: Any, config: GaitConfig, gait: GaitState, velocity: Any, command: Any) -> tuple[Any, Any]:
@@ -214,4 +221,6 @@ def aim(xp: Any, config: GaitConfig, gait: GaitState, plan: Plan, velocity: Any,
     over = xp.amax(xp.where(swinging, apex - gait.lift[..., 2], 0 * apex), -1) - config.lift + LINK + _OVER
     hip = xp.clip(over, config.hip_height, config.highest_hip)
     hip = gait.hip + (hip - gait.hip) * (CONTROL_DT / _RISE)
-    return gait._replace(target=target, apex=apex, rate=plan.rate, hip=hip)
+    missed = gait.missed + CONTROL_DT * (command[:, :2] - velocity)
+    missed = xp.where(is_moving(xp, command)[:, None], xp.clip(missed, -_MISSED, _MISSED), 0 * missed)
+    return gait._replace(target=target, apex=apex, rate=plan.rate, hip=hip, missed=missed)

@@ -393,6 +393,7 @@ class LocoEnvironment:
             path_error=steps.path_error,
             swing=steps.swing,
             middle=steps.middle,
+            late=steps.late,
             gap=steps.gap,
             blocked=steps.blocked,
             foot_speed=steps.speed,

@@ -24,12 +24,11 @@ _UPRIGHT = 0.1
 _PUSH, _TURN = 0.2, 0.35
 """They move the trunk by what it misses of its velocity in so much time [s], along and in turning."""
 
-_LEAD = 2 * KD / KP
-"""Dampers hold legs back that move: they are commanded so much ahead [s]. Damping over stiffness alone leaves a robot
-at 0.41 m/s where 0.5 are asked for, twice that at 0.48; a slower robot has shorter strides than its plan."""
+_CATCH_UP = 0.5
+"""And by this fraction of the way by which it has fallen behind."""
 
-_PRESS = 0.03
-"""A foot that comes down is commanded this far below its foothold [m]: it stands when the clock says so."""
+_LEAD = 2 * KD / KP
+"""Dampers hold legs back that move: they are commanded so much ahead [s], twice what dampers alone would ask for."""
 
 _SOFT = 1e-3
 """Where feet that stand cannot carry the weight without a moment (two on a line), they come this near [m^2]."""
@@ -75,8 +74,6 @@ class GaitReference(nn.Module):
         late = LOOK_AHEAD
         path = feet + row("path_ahead").reshape(n, 4, 3)
         level = torch.cat([velocity[:, :2], torch.zeros_like(velocity[:, 2:])], 1)
-        down = (~stands & loaded).float() * _PRESS
-        path = torch.cat([path[..., :2], path[..., 2:] - down[..., None]], -1)
         path = _turned(path - late * level[:, None], -late * turning[:, 2])
         path = _in_trunk(path, roll + 0.5 * late * turning[:, 0], pitch + 0.5 * late * turning[:, 1])
 
@@ -84,7 +81,7 @@ class GaitReference(nn.Module):
         standing = stands.float()
         floor = (standing * feet[..., 2]).sum(1) / standing.sum(1).clip(min=1.0) - FOOT_RADIUS
         lack = self._hip + row("hip")[:, 0] + floor
-        shift = _LEAD * command[:, :2] + _PUSH * (command[:, :2] - velocity[:, :2])
+        shift = _LEAD * command[:, :2] + _PUSH * (command[:, :2] - velocity[:, :2]) + _CATCH_UP * row("missed")
         under = torch.cat([feet[..., :2] - shift[:, None], feet[..., 2:] - lack[:, None, None]], -1)
         under = _turned(under, -_TURN * (command[:, 2] - turning[:, 2]))
         under = _in_trunk(under, -_UPRIGHT * turning[:, 0], -_UPRIGHT * turning[:, 1])  # of a trunk that is upright

@@ -29,7 +29,7 @@ from vinl.policies.reference import GaitReference
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, FOOT_RADIUS
 from vinl.robot.cameras import Camera
 
-_GAIT_NUMBERS = (4, 1, 4, 12, 12, 4, 1)
+_GAIT_NUMBERS = (4, 1, 4, 12, 12, 4, 1, 2)
 """Sizes of the fields of ``GaitState``."""
 
 
@@ -126,7 +126,7 @@ class SteppingActor(PolicyNetwork):
         n = parts["velocity"].shape[1]
         fields = parts["gait"][0].split(_GAIT_NUMBERS, 1)
         lift, target = (x.reshape(n, 4, 3) for x in fields[3:5])
-        gait = GaitState(fields[0], fields[1][:, 0], fields[2], lift, target, fields[5], fields[6][:, 0])
+        gait = GaitState(fields[0], fields[1][:, 0], fields[2], lift, target, fields[5], fields[6][:, 0], fields[7])
         map_ = None if self.elevation is None else MapState(*(parts[name][0] for name in MapState._fields))
         network = tuple(parts[name] for name in ("hidden", "cell") if name in parts)
         return Memory(network, gait, parts["velocity"][0], map_)
