@@ -132,7 +132,7 @@ def test_a_gait_is_an_input_and_an_output():
     assert states == {
         "hidden": ([1, 1, 16], 0.0),
         "cell": ([1, 1, 16], 0.0),
-        "gait": ([1, 1, 38], 0.0),
+        "gait": ([1, 1, 40], 0.0),
         "velocity": ([1, 1, 3], 0.0),
         "begun": ([1, 1], 0.0),
     }

@@ -147,7 +147,7 @@ def test_the_knee_is_a_link_away_from_foot_and_hip_and_points_back() -> None:
     assert (back < -ahead / 2 + 1e-9).all()
 
 
-@pytest.mark.parametrize(("height", "clean"), [(0.05, 8), (0.10, 7), (0.15, 6)])
+@pytest.mark.parametrize(("height", "clean"), [(0.05, 8), (0.10, 8), (0.15, 8)])
 def test_planned_feet_and_shanks_clear_a_bar_and_are_in_reach(height: float, clean: int) -> None:
     over = glide(CONFIG, height, speed=0.5, robots=8)
     assert not over.foot.any()

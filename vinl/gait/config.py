@@ -40,11 +40,11 @@ class GaitConfig:
     hip_height: float = 0.42
     highest_hip: float = 0.47
     lift: float = 0.08
-    edge: float = 0.035
+    edge: float = 0.05
     shank: float = 0.05
     map: bool = True
     modulate: float = 0.4
-    capture: float = 0.4
+    capture: float = 0.35
 
     def __post_init__(self) -> None:
         low, high = self.period

@@ -168,13 +168,13 @@ _RATE_COST = 1.0
 _APART = 0.2
 """Phase by which a leg may leave the trot at a cost of 1."""
 
-_LEANS = (-0.165, 0.0, 0.165)
+_LEANS = tuple(np.arange(-3, 4) * 0.055)
 """Offsets from Raibert's footholds for which a track is looked at [m]: the farther ahead of the hip a foot comes down,
 the farther back its shank leans."""
 
 
 def _tracks(xp: Any, nominal: Any, heading: Any, command: Any) -> tuple[Any, Any]:
-    """(n, 4, 93, 2) places along the track of each foot, once for each of ``_LEANS``, and (93,) these [m]."""
+    """(n, 4, 217, 2) places along the track of each foot, once for each of ``_LEANS``, and (217,) these [m]."""
     track = constant(xp, TRACK.astype(np.float32), nominal)
     course = command[:, :2] / xp.clip(_speed(xp, command), _LEAST_SPEED, None)[:, None]
     direction = turn(xp, heading, course[:, None] + 0 * nominal)
@@ -190,7 +190,7 @@ def _speed(xp: Any, command: Any) -> Any:
 def _choose_rates(xp: Any, config: GaitConfig, gait: GaitState, command: Any, feet: Any, blocked: Any) -> Any:
     """(n, 4) the rates at which the next footholds of every foot ask for the smallest offsets.
 
-    ``blocked`` (n, 4, 93) is what is in the way along the tracks; what a foothold would cost whose Raibert place is at
+    ``blocked`` (n, 4, 217) is what is in the way along the tracks; what a foothold would cost whose Raibert place is at
     any of their places follows from it, and with that the cost of every rate, held for one stance. First a rate for all
     legs together: they meet a bar in phase. Then one for each, which is drawn back to the trot.
     """
