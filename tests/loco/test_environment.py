@@ -9,7 +9,7 @@ import pytest
 
 from vinl.gait.observation import STEPPING_MAP_TABLE, insert_gait, observe_gait
 from vinl.gait.state import GaitState, feet_in_heading_frame, swings
-from vinl.loco.environment import PRIVILEGED, LocoEnvironment
+from vinl.loco.environment import LocoEnvironment
 from vinl.loco.randomisation import plain_traits
 from vinl.loco.simulation import PAST, Body, Simulation
 from vinl.robot.aliengo import DEFAULT_POSE, home_qpos
@@ -41,7 +41,7 @@ def test_observation_is_that_of_the_evaluation(fresh):
     rows = observe_gait(np, fresh.config.gait, gait, feet_in_heading_frame(np, qpos))
     expected = insert_gait(np, expected, rows)
     seen = fresh.observe()
-    assert seen.exact.shape == (8, STEPPING_MAP_TABLE.size) and seen.privileged.shape == (8, PRIVILEGED)
+    assert seen.exact.shape == (8, STEPPING_MAP_TABLE.size) and seen.privileged.shape == (8, 16 + 3 + 8)
     assert np.allclose(seen.exact, expected, atol=1e-4)
     np.testing.assert_allclose(seen.velocity, expected[:, :3] / 2.0, atol=1e-4)
     noise = np.abs(np.asarray(seen.noisy) - expected)

@@ -28,6 +28,13 @@ def scatter(homes, rng) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return home, spots + rng.uniform(-0.15, 0.15, (N, 2)), rng.uniform(-math.pi, math.pi, N)
 
 
+def put(environment, home, xy, yaw):
+    """Begin an episode of every robot at such a place, with the first goal of its home."""
+    environment.restart()
+    for name, values in (("home", home), ("goal", np.zeros(N)), ("position", xy), ("yaw", yaw)):
+        environment.state[name].copy_(torch.tensor(values))
+
+
 def follow_arc(xy, yaw, v, w, t):
     """The pose after t seconds at constant forward speed and yaw rate."""
     if abs(w) < 1e-9:
@@ -46,7 +53,7 @@ def test_moves_on_arcs_and_is_stopped_as_exact_geometry_says(blind, homes, lowes
     rng = np.random.default_rng(0)
     environment = NavEnvironment(replace(blind, robot=replace(blind.robot, min_speed=lowest)), homes)
     home, xy, yaw = scatter(homes, rng)
-    environment.place(torch.tensor(home), torch.zeros(N, dtype=torch.int64), torch.tensor(xy), torch.tensor(yaw))
+    put(environment, home, xy, yaw)
     action = rng.uniform(-1, 1, (N, 2)).astype(np.float32)
     action[:5, 1] = 0.0  # straight on
     environment.advance(torch.tensor(action))
@@ -101,7 +108,7 @@ def test_gives_way_when_it_turns_against_something(blind, homes):
         rng = np.random.default_rng(1)
         environment = NavEnvironment(replace(blind, execution=ExecutionConfig(give_way=give_way)), homes)
         home, xy, yaw = scatter(homes, rng)
-        environment.place(torch.tensor(home), torch.zeros(N, dtype=torch.int64), torch.tensor(xy), torch.tensor(yaw))
+        put(environment, home, xy, yaw)
         before = environment.state["position"].clone(), environment.state["yaw"].clone()
         action = torch.tensor(rng.uniform(-1, 1, (N, 2)).astype(np.float32))
         environment.advance(action)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
@@ -16,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from vinl.chain.records import Episode, EpisodeRecord, EpisodeTrace, Key
+from vinl.chain.records import Episode, EpisodeRecord, EpisodeTrace, Key, name_episode
 from vinl.config.errors import InputError
 from vinl.config.output import write_json, write_whole
 from vinl.world.floorplan import FloorPlan
@@ -266,8 +265,7 @@ _WIDTHS = {"position": 3, "orientation": 4, "joints": 12, "command": 3}
 
 def find_recording(folder: Path, key: Key) -> Path:
     """The file of an episode, whether it is there or not."""
-    plan, seed, episode = key
-    return folder / RECORDINGS / (re.sub(r"[^\w.-]+", "_", f"{plan}_episode{episode}_seed{seed}") + ".npz")
+    return folder / RECORDINGS / f"{name_episode(*key)}.npz"
 
 
 def write_recording(folder: Path, episode: Episode) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -14,6 +15,11 @@ from vinl.world.floorplan import FloorPlan
 
 Key = tuple[str, int, int]
 """What tells an episode from all others of a row: name of the plan, seed, number of the start/goal pair."""
+
+
+def name_episode(plan: str, seed: int, episode: int) -> str:
+    """Name of the files that are kept of an episode, without what they end in."""
+    return re.sub(r"[^\w.-]+", "_", f"{plan}_episode{episode}_seed{seed}")
 
 
 @dataclass(frozen=True)

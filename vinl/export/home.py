@@ -25,7 +25,6 @@ def export_home(
     episodes: int = 10,
     obstacles: str = "paper",
     seed: int = 0,
-    config: EvaluationConfig | None = None,
 ) -> Path:
     """Write a home and episodes in it, the same as those of ``vinl eval``.
 
@@ -39,7 +38,6 @@ def export_home(
         episodes: start/goal pairs.
         obstacles: clutter, one of ``CLUTTER``.
         seed: of clutter, heading and joint angles at the start.
-        config: rules that the pairs are drawn by.
 
     Raises:
         InputError: unknown clutter, no such number of episodes, or the folder cannot be written.
@@ -49,7 +47,7 @@ def export_home(
         raise InputError(f"episodes must be at least 1, got {episodes}")
     if seed < 0:
         raise InputError(f"seed must not be negative, got {seed}")
-    rules = config or EvaluationConfig()
+    rules = EvaluationConfig()
     setups = draw_setups(plan, draw_routes(plan, episodes, rules), seed, clutter, rules)
     folder, spec = Path(out), scene_spec(plan.boxes, Boxes.empty())
     spec.modelname, spec.comment = plan.name, ""

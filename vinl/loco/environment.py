@@ -35,9 +35,6 @@ _EDGE = 2.0
 MAX_SPEED = 150.0
 """A speed beyond this [m/s, rad/s] means that the physics blew up."""
 
-PRIVILEGED = 16 + 3 + 8
-"""Numbers that only the critic knows."""
-
 _VELOCITY = STEPPING_MAP_TABLE.place("base_linear_velocity")
 
 _UPSIDE = -math.cos(MAX_TILT)
@@ -50,7 +47,7 @@ class Observations(NamedTuple):
     Attributes:
         noisy: (n, numbers) with noise and biases, for the actor.
         exact: the same without, for the critic, and for a teacher.
-        privileged: (n, ``PRIVILEGED``) what only the critic knows beside them: contacts, the errors of what is
+        privileged: (n, 27) what only the critic knows beside them: contacts, the errors of what is
             measured, what the robot is like, and whether blocks collide.
         heights: (n, 741) of the ground at ``gait.local_map.POINTS`` above the floor that the feet stand on [m], in
             stage 3; (n, 0) elsewhere.

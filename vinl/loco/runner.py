@@ -20,7 +20,7 @@ class TrainingRunner(TrainingLoop, OnPolicyRunner):
     """rsl-rl's runner, which builds models and algorithm, with our loop.
 
     Args:
-        env: an rsl-rl environment that is a ``TrainingEnv`` too.
+        env: as for ``TrainingLoop``.
         settings: rsl-rl's configuration; a copy is used, because rsl-rl changes its own.
         rest: as for ``TrainingLoop``.
     """

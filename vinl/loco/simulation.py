@@ -140,7 +140,6 @@ class Simulation:
         blocks: those on the ground: the whole length of the shanks is held against them. The three spheres of a shank
             leave gaps through which the edge of a block slips.
         walls: what else footholds must keep off.
-        leg_pairs: spheres of which each touches its partner.
 
     Attributes:
         ground: the arrays that ``step`` needs; ``set_solid`` changes whether its blocks collide.
@@ -155,7 +154,6 @@ class Simulation:
         kd: float,
         blocks: Blocks | None = None,
         walls: Boxes | None = None,
-        leg_pairs: tuple[tuple[str, str], ...] = LEG_PAIRS,
     ) -> None:
         self.frame = field.frame
         rows, columns = field.frame.shape
@@ -173,7 +171,7 @@ class Simulation:
             conaffinity=0,
             condim=1,
         )
-        for a, b in leg_pairs:
+        for a, b in LEG_PAIRS:
             spec.add_pair(geomname1=a, geomname2=b, condim=1)
         self.model = spec.compile()
         self.model.hfield_data[:] = normalised

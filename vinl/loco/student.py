@@ -66,7 +66,6 @@ def train_student(
     run: RunFolder,
     resume: bool,
     device: str = "cpu",
-    name: str = "",
     save_every: float = 60.0,
     iterations: int | None = None,
     minutes: float | None = None,
@@ -109,7 +108,7 @@ def train_student(
     def export(policy: SteppingActor, samples: int) -> None:
         action = {**describe_action(), "kp": config.kp, "kd": config.kd}
         card = locomotion_card(
-            name or run.path.name,
+            run.path.name,
             policy.describe(),
             action,
             table=SENSED_TABLE,

@@ -86,7 +86,6 @@ def train_locomotor(
     config: LocoConfig | None,
     folder: str | Path,
     device: str = "cpu",
-    name: str = "",
     save_every: float = 60.0,
     iterations: int | None = None,
     minutes: float | None = None,
@@ -97,7 +96,6 @@ def train_locomotor(
         config: of a new run; None resumes the run in ``folder``.
         folder: of the run.
         device: ``"cpu"`` or ``"cuda"``.
-        name: of the policy; defaults to the folder's.
         save_every: seconds between checkpoints.
         iterations: updates in all; defaults to the configuration's.
         minutes: after which the training is over too; settings that move over the training keep to them.
@@ -116,7 +114,7 @@ def train_locomotor(
     if config.stage == 3:
         from vinl.loco.student import train_student  # Warp is started for stage 3 alone
 
-        return train_student(config, run, resume, device, name, save_every, iterations, minutes)
+        return train_student(config, run, resume, device, save_every, iterations, minutes)
     begun = resume and (run.path / CHECKPOINT).exists()
     start = load_warm_start(config.from_policy, config) if config.from_policy and not begun else None
     if not resume:
@@ -132,7 +130,7 @@ def train_locomotor(
 
     def export(model: StepModel, samples: int) -> None:
         actor = model.export()
-        card = make_card(name or run.path.name, config, actor.describe(), samples, commit, origin)
+        card = make_card(run.path.name, config, actor.describe(), samples, commit, origin)
         save_policy(run.policy, actor, card)
 
     def schedule(algorithm: Any, fraction: float) -> None:

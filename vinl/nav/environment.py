@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 import warp as wp
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from vinl.config.errors import InputError
@@ -17,7 +17,6 @@ from vinl.nav.kernels import (
     Robots,
     aim_cameras,
     draw_keys,
-    measure_robots,
     move_robots,
     place_robots,
     render_interior,
@@ -248,38 +247,6 @@ class NavEnvironment:
             self.state["chance"].copy_(torch.tensor([mixed, 0], dtype=torch.int32))
         self.state["chance"][1] += 1
         self._start(torch.ones(self.num_envs, dtype=torch.bool, device=self.device) if chosen is None else chosen)
-
-    def place(
-        self,
-        home: Int[Tensor, " n"],
-        goal: Int[Tensor, " n"],
-        position: Float[Tensor, "n 2"],
-        yaw: Float[Tensor, " n"],
-    ) -> None:
-        """Begin an episode of every robot where one wants it; camera and execution are drawn as always.
-
-        Args:
-            home: slot of the store.
-            goal: number of the goal in that home.
-            position: of the robots' middles [m].
-            yaw: headings [rad].
-
-        Raises:
-            InputError: a goal cannot be reached from its robot's place. The host waits for the device to know.
-        """
-        self.restart()
-        for name, values in (("home", home), ("goal", goal), ("position", position), ("yaw", yaw)):
-            self.state[name].copy_(torch.as_tensor(values))
-        self._launch(measure_robots, self.num_envs, [self.homes.homes, self._robots])
-        lost = (~torch.isfinite(self.state["distance"])).nonzero()
-        if len(lost):
-            raise InputError(f"robot {int(lost[0])} cannot reach its goal from where it was placed")
-        self.state["start_distance"].copy_(self.state["distance"])
-        self._chosen.fill_(True)
-        self._draw_errors()
-        if "places" in self.state:
-            self._forget(self._chosen)
-        self._observation = None
 
     def stagger(self) -> None:
         """Let the present episodes look as if each had begun a random while ago, so that not all run out of time at

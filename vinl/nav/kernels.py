@@ -356,15 +356,6 @@ def move_robots(
 
 @wp.kernel
 @no_type_check
-def measure_robots(homes: Homes, robots: Robots):
-    """Distance to the goal where the robots are, infinite where it cannot be reached."""
-    n = wp.tid()
-    distance = read_distance(homes, robots.home[n], robots.goal[n], robots.position[n])
-    robots.distance[n] = wp.where(distance < NOWHERE, distance, wp.inf)
-
-
-@wp.kernel
-@no_type_check
 def place_robots(
     homes: Homes,
     rules: Rules,

@@ -94,7 +94,6 @@ def train_navigator(
     config: NavConfig | None,
     folder: str | Path,
     device: str = "cpu",
-    name: str = "",
     save_every: float = 60.0,
     iterations: int | None = None,
     minutes: float | None = None,
@@ -108,7 +107,6 @@ def train_navigator(
         config: of a new run; None resumes the run in ``folder``.
         folder: of the run.
         device: ``"cpu"`` or ``"cuda"``.
-        name: of the policy; defaults to the folder's.
         save_every: seconds between checkpoints.
         iterations: updates in all; defaults to the configuration's.
         minutes: after which the training is over too; settings that move over the training keep to them.
@@ -157,7 +155,7 @@ def train_navigator(
 
     def write(model: RecurrentActorCritic, samples: int, folder: Path) -> None:
         assert isinstance(model.actor, NavActor)
-        save_policy(folder, model.actor, make_card(name or run.path.name, config, samples, commit, origin))
+        save_policy(folder, model.actor, make_card(run.path.name, config, samples, commit, origin))
 
     def export(model: RecurrentActorCritic, samples: int) -> None:
         if peers.leads:

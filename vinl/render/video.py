@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.records import Episode
+from vinl.chain.records import Episode, name_episode
 from vinl.chain.rollout import InterruptedRunError
 from vinl.render.film_file import write_caption, write_film
 from vinl.render.panels import MapPanel, colour_depth, compose
@@ -58,7 +57,7 @@ class FilmJob:
 
 def name_film(plan: str, seed: int, episode: int) -> str:
     """File name of the film of an episode."""
-    return re.sub(r"[^\w.-]+", "_", f"{plan}_episode{episode}_seed{seed}") + ".mp4"
+    return name_episode(plan, seed, episode) + ".mp4"
 
 
 def film(job: FilmJob, config: EvaluationConfig, is_stopped: Callable[[], bool] = lambda: False) -> str:

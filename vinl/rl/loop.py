@@ -82,33 +82,6 @@ Figures = Callable[[dict[str, float]], dict[str, str]]
 
 
 @runtime_checkable
-class TrainingEnv(Protocol):
-    """What the loop needs of an environment beside rsl-rl's ``VecEnv``."""
-
-    num_envs: int
-
-    def get_observations(self) -> Any:
-        """Of the present state."""
-        ...
-
-    def step(self, actions: torch.Tensor) -> tuple[Any, torch.Tensor, torch.Tensor, dict[str, Any]]:
-        """Observations, rewards, dones and extras."""
-        ...
-
-    def read_measures(self) -> dict[str, float]:
-        """Means since the last call."""
-        ...
-
-    def save_state(self) -> dict[str, Any]:
-        """Tensors and plain data that ``load_state`` takes back."""
-        ...
-
-    def load_state(self, state: dict[str, Any]) -> None:
-        """Go on from a saved state."""
-        ...
-
-
-@runtime_checkable
 class Algorithm(Protocol):
     """A learner with the names of rsl-rl's algorithms.
 
@@ -155,7 +128,7 @@ class TrainingLoop:
     """Roll out, learn, write down, again; nothing waits for the device inside a roll-out.
 
     Args:
-        env: the robots.
+        env: rsl-rl's ``VecEnv``, with ``read_measures`` (means since the last call), ``save_state`` and ``load_state``.
         algorithm: the learner.
         steps: control steps of each robot between updates.
         folder: of the run.

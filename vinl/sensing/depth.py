@@ -90,7 +90,6 @@ class DepthCamera:
         self.mesh_ids = wp.array([mesh.id for mesh in self._meshes], dtype=wp.uint64, device=self._warp_device)
         self._mount = self._on_device(np.array(camera.position))
         self._turn = self._on_device(camera.rotation())
-        self._tan_half = self._on_device(np.array([camera.tan_half]))
 
     def __len__(self) -> int:
         """How many worlds there are."""
@@ -118,12 +117,7 @@ class DepthCamera:
         return self.render_poses(world, position + rotation @ self._mount, rotation @ self._turn, out=out)
 
     def render_poses(
-        self,
-        world: Any,
-        position: Any,
-        rotation: Any,
-        tan_half: Any | None = None,
-        out: torch.Tensor | None = None,
+        self, world: Any, position: Any, rotation: Any, out: torch.Tensor | None = None
     ) -> Float[torch.Tensor, "n height width"]:
         """What a camera sees from given poses, for mounts that differ from image to image.
 
@@ -131,7 +125,6 @@ class DepthCamera:
             world: (n,) integers, the world that each camera is in. On a GPU tensor the range is not checked.
             position: (n, 3) of the optical centre in the world [m].
             rotation: (n, 3, 3) camera to world: columns are forward, left and up.
-            tan_half: (n, 2) tangents of half the horizontal and vertical field of view; the camera's own by default.
             out: as in ``render``.
 
         Returns:
@@ -142,35 +135,29 @@ class DepthCamera:
         """
         position, rotation = self._on_device(position), self._on_device(rotation)
         _check_shapes(world, position, rotation)
-        n, shape = len(position), (len(position), self.camera.height, self.camera.width)
-        tan_half = self._tan_half.expand(n, 2) if tan_half is None else self._on_device(tan_half)
-        if tuple(tan_half.shape) != (n, 2):
-            raise InputError(f"tan_half needs shape ({n}, 2), got {tuple(tan_half.shape)}")
+        shape = len(position), self.camera.height, self.camera.width
         if out is None:
             out = torch.empty(shape, dtype=self.dtype, device=self.device)
         elif out.shape != shape or out.dtype != self.dtype or out.device != self.device or not out.is_contiguous():
             raise InputError(f"out needs shape {shape}, {self.dtype}, {self.device}, contiguous")
-        if n == 0:
+        if not len(position):
             return out
         self.launch(
             wp.from_torch(self._world(world), dtype=wp.int32),
             wp.from_torch(position.contiguous(), dtype=wp.vec3),
             wp.from_torch(rotation.contiguous(), dtype=wp.mat33),
-            wp.from_torch(tan_half.contiguous(), dtype=wp.vec2),
             wp.from_torch(out),
         )
         return out
 
-    def launch(
-        self, world: wp.array, position: wp.array, rotation: wp.array, tan_half: wp.array, out: wp.array, **options: Any
-    ) -> Any:
+    def launch(self, world: wp.array, position: wp.array, rotation: wp.array, out: wp.array, **options: Any) -> Any:
         """Launch the kernel on Warp's arrays as in ``render_poses``, unchecked; ``options`` of ``wp.launch``."""
         over_floor = self._floor is not None
         return wp.launch(
             render_depth_over_floor if over_floor else render_depth,
             dim=out.shape,
             inputs=[
-                *(self.mesh_ids, world, position, rotation, tan_half, self.camera.far),
+                *(self.mesh_ids, world, position, rotation, wp.vec2(*self.camera.tan_half), self.camera.far),
                 *((self._floor,) if over_floor else ()),
             ],
             outputs=[out],
@@ -225,14 +212,12 @@ class PreparedRender:
         camera = depth.camera
         self._world, self._position = np.zeros(n, np.int32), np.zeros((n, 3), np.float32)
         self._rotation = np.zeros((n, 3, 3), np.float32)
-        self._tan_half = np.tile(np.array(camera.tan_half, np.float32), (n, 1))
         self._images = np.zeros((n, camera.height, camera.width), np.float32)
         self._answer = torch.from_numpy(self._images)
         self._launch: Any = depth.launch(
             _share(self._world, wp.int32),
             _share(self._position, wp.vec3),
             _share(self._rotation, wp.mat33),
-            _share(self._tan_half, wp.vec2),
             _share(self._images, wp.float32),
             record_cmd=True,
         )

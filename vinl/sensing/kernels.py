@@ -30,13 +30,13 @@ def render_depth(
     world: wp.array(dtype=wp.int32),
     position: wp.array(dtype=wp.vec3),
     rotation: wp.array(dtype=wp.mat33),
-    tan_half: wp.array(dtype=wp.vec2),
+    tan_half: wp.vec2,
     far: wp.float32,
     depth: wp.array(dtype=Any, ndim=3),
 ):
     """One thread a pixel."""
     image, row, column = wp.tid()
-    direction = rotation[image] * look_through(row, column, depth.shape[1], depth.shape[2], tan_half[image])
+    direction = rotation[image] * look_through(row, column, depth.shape[1], depth.shape[2], tan_half)
     t = far
     hit = wp.mesh_query_ray(meshes[world[image]], position[image], direction, far)
     if hit.result:
@@ -51,7 +51,7 @@ def render_depth_over_floor(
     world: wp.array(dtype=wp.int32),
     position: wp.array(dtype=wp.vec3),
     rotation: wp.array(dtype=wp.mat33),
-    tan_half: wp.array(dtype=wp.vec2),
+    tan_half: wp.vec2,
     far: wp.float32,
     floor: wp.float32,
     depth: wp.array(dtype=Any, ndim=3),
@@ -59,7 +59,7 @@ def render_depth_over_floor(
     """As ``render_depth``, with a level floor that is not in the meshes: where it is hit follows from one division, and
     nothing behind it is looked for."""
     image, row, column = wp.tid()
-    direction = rotation[image] * look_through(row, column, depth.shape[1], depth.shape[2], tan_half[image])
+    direction = rotation[image] * look_through(row, column, depth.shape[1], depth.shape[2], tan_half)
     start = position[image]
     t = far
     if direction[2] < 0.0 and start[2] > floor:

@@ -55,9 +55,9 @@ def inside_mesh(plan: FloorPlan) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarr
     return vertices.astype(np.float32), faces.reshape(-1, 3)
 
 
-def inside_lines(plan: FloorPlan, z: float = 0.003) -> Float[np.ndarray, "n 2 3"]:
+def inside_lines(plan: FloorPlan) -> Float[np.ndarray, "n 2 3"]:
     """Lines ``TILE`` apart over the floor inside the building [m]: by them one sees the robot move."""
-    frame, half = plan.frame, plan.frame.resolution / 2
+    frame, half, z = plan.frame, plan.frame.resolution / 2, 0.003
     x, y = frame.centres()
     every = round(TILE / frame.resolution)
     lines = []

@@ -142,10 +142,6 @@ Request = (
 """Any of them."""
 
 
-STATES = ("standing", "walking", "driven", "reached", "fallen", "recorded")
-"""What the robot is about."""
-
-
 @dataclass(frozen=True, eq=False)
 class DepthImage:
     """What a depth camera sees: (height, width) [m], and the camera."""
@@ -174,7 +170,7 @@ class Snapshot:
     Attributes:
         world: plan and clutter; another object when one of them changed.
         time_s: since the robot was last put down, or of a recording [s].
-        state: one of ``STATES``.
+        state: standing, walking, driven, reached, fallen or recorded.
         qpos: (19,) generalised position.
         velocity: (3,) forward, left [m/s], yaw rate [rad/s] in the heading frame.
         command: (3,) the same as commanded.

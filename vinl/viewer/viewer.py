@@ -237,7 +237,7 @@ class Viewer:
                 with self._server.atomic():
                     self.scene.draw(snapshot)
                     if now - told > 1 / TEXT_RATE or snapshot.paused:
-                        self._tell(snapshot, shown)
+                        self._tell(snapshot)
                         told = now
                 shown = snapshot
             if snapshot.notice[0] != noticed:
@@ -246,7 +246,7 @@ class Viewer:
                     client.add_notification(snapshot.notice[1], "", auto_close_seconds=4.0)
             self._closing.wait(max(0.0, 1 / DRAW_RATE - (time.perf_counter() - now)))
 
-    def _tell(self, snapshot: Snapshot, before: Snapshot | None) -> None:
+    def _tell(self, snapshot: Snapshot) -> None:
         """Figures and images."""
         self._status.content = render_status(snapshot)
         if self._controls is not None:

@@ -97,16 +97,12 @@ def check_file(path: str | Path) -> tuple[Path, int | None]:
 
 
 def load_floorplans(
-    paths: Sequence[str | Path],
-    resolution: float | None = None,
-    min_speck: int = 0,
-    wall_height: float = 2.5,
-    up: str | None = None,
+    paths: Sequence[str | Path], resolution: float | None = None, min_speck: int = 0
 ) -> list[FloorPlan]:
     """Read several floor plans, the shipped ones if none are named; see ``load_floorplan``. One that is named twice is
     read once."""
     names = dict.fromkeys(map(str, paths or shipped_floorplans()))
-    return [load_floorplan(name, resolution, min_speck, wall_height, up) for name in names]
+    return [load_floorplan(name, resolution, min_speck) for name in names]
 
 
 def open_floorplans(floorplans: str | Path | FloorPlan | Sequence[str | Path | FloorPlan]) -> list[FloorPlan]:
