@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from vinl.config.errors import InputError
 from vinl.gait.clock import OFFSETS, swing_fraction, unison, wanted_period
 from vinl.gait.config import GaitConfig
-from vinl.gait.footholds import plan_footholds
+from vinl.gait.footholds import LEANS, obstruction, plan_footholds
 from vinl.gait.gliding import glide
 from vinl.gait.ground_view import FieldView, build_ground_map
 from vinl.gait.leg import knee_from_foot
@@ -222,3 +222,21 @@ def test_what_a_slow_trunk_has_missed_is_kept_up_to_a_limit_and_forgotten_when_i
     assert missed[-1] == pytest.approx(0.12)
     gait = aim(np, CONFIG, gait, plan, 0 * slow, 0 * command, feet)
     assert (gait.missed == 0).all()
+
+
+def test_places_on_a_track_cost_the_same_one_by_one() -> None:
+    frame = GridFrame(-4.0, -4.0, 0.05, (161, 161))
+    field, bar = flat_field(frame), Boxes(np.array([[0.5, 0.1, 0.4, 0.2, 2.0, 0.0, 0.1]]))
+    raise_boxes(field, bar, BLOCK)
+    qpos = home_qpos(0.0, 0.1, 0.38, 0.4)[None]
+    view = FieldView(np, build_ground_map(field.heights, frame, bar), frame, qpos)
+    gait = start_gait(np, CONFIG, feet_in_heading_frame(np, qpos))._replace(period=np.full(1, 0.96))
+    command = np.array([[0.5, 0.0, 0.2]])
+    points = np.random.default_rng(0).uniform(-0.8, 0.8, (1, 4, 20, 2))
+    heading = np.full((1, 4), 0.1)
+    every = obstruction(np, CONFIG, view, gait, command, points[:, :, None], heading, LEANS[:, None])
+    assert every.shape == (1, 4, len(LEANS), 20)
+    for k, lean in enumerate(LEANS):
+        alone = obstruction(np, CONFIG, view, gait, command, points, heading, np.full(20, lean))
+        np.testing.assert_allclose(every[:, :, k], alone, atol=1e-4)
+    assert (every[0, 0, 0] != every[0, 0, -1]).any() and (every == 0).any()

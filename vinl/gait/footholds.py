@@ -74,11 +74,9 @@ def plan_footholds(
     nominal, heading = raibert(xp, config, gait, velocity, command)
     candidates = constant(xp, CANDIDATES, level)
     points = nominal[:, :, None] + turn(xp, heading[..., None], candidates[None, None])
-    tracks, leans = _tracks(xp, nominal, heading, command)
-    everywhere = xp.concatenate([points, tracks], 2)
-    along = xp.concatenate([candidates[:, 0], leans])
-    blocked = obstruction(xp, config, view, gait, command, everywhere, heading, along)
-    cost, blocked = blocked[..., : len(CANDIDATES)], blocked[..., len(CANDIDATES) :]
+    cost = obstruction(xp, config, view, gait, command, points, heading, candidates[:, 0])
+    leans = constant(xp, LEANS, level)[:, None]
+    blocked = obstruction(xp, config, view, gait, command, _tracks(xp, nominal, heading, command), heading, leans)
     side = constant(xp, np.sign(stance_places(config)[:, 1]), level)[:, None]
     inward = xp.clip(-candidates[:, 1] * side - _INWARD[0], 0.0, None) / _INWARD[1]
     cost = cost + ((candidates[:, 0] / _WIDTH[0]) ** 2 + (candidates[:, 1] / _WIDTH[1]) ** 2 + inward**2)
@@ -113,29 +111,29 @@ def obstruction(
 
     Args:
         xp, config, view, gait, command: as for ``plan_footholds``.
-        points: (n, 4, k, 2) footholds in the heading frame [m].
+        points: (n, 4, k, 2) footholds in the heading frame [m]; or (n, 4, 1, k, 2), each with every one of ``along``.
         heading: (n, 4) of the trunk then [rad].
-        along: (k,) how far ahead of Raibert's footholds they are [m].
+        along: (k,) how far ahead of Raibert's footholds they are [m]; or (j, 1).
 
     Returns:
-        (n, 4, k), 0 where nothing is in the way.
+        (n, 4, k), or (n, 4, j, k), 0 where nothing is in the way.
     """
+    ones = (1,) * along.ndim
     ground = view.height(points) + FOOT_RADIUS
     sweep = command[:, 0] * stance_time(xp, config, gait)
     stance = constant(xp, stance_places(config)[:, 0] - HIPS[:, 0].astype(np.float32), along)
-    touch_down = (stance + sweep[:, None] / 2)[..., None] + along
-    ahead = xp.stack([touch_down, touch_down - sweep[:, None, None]], -1)  # (n, 4, k, 2)
-    hip = (gait.hip - FOOT_RADIUS)[:, None, None, None]
+    touch_down = (stance + sweep[:, None] / 2).reshape(-1, 4, *ones) + along
+    ahead = xp.stack([touch_down, touch_down - sweep.reshape(-1, 1, *ones)], -1)
+    hip = (gait.hip - FOOT_RADIUS).reshape(-1, 1, *ones, 1)
     back, up = knee_from_foot(xp, ahead, hip + 0 * ahead)
     parts = constant(xp, np.array(SHANK_FRACTIONS, np.float32), along)
     back, up = ((x[..., None] * parts).reshape(*x.shape[:-1], 2 * len(SHANK_FRACTIONS)) for x in (back, up))
-    behind = xp.stack([xp.cos(heading), xp.sin(heading)], -1)[:, :, None, None] * back[..., None]
+    behind = xp.stack([xp.cos(heading), xp.sin(heading)], -1).reshape(-1, 4, *ones, 1, 2) * back[..., None]
     leg = xp.concatenate([points[..., None, :] + behind, (ground[..., None] + up)[..., None]], -1)
-    foot = xp.concatenate([points, ground[..., None]], -1)[..., None, :]
-    gap = view.clearance(xp.concatenate([foot, leg], -2))
-    short = xp.amax(config.shank - gap[..., 1:], -1)
+    foot = xp.concatenate([points, ground[..., None]], -1)
+    short = xp.amax(config.shank - view.clearance(leg), -1)
     too_far = xp.clip(xp.abs(ahead) - farthest(xp, hip), 0.0, None).sum(-1)
-    touches = _price(xp, FOOT_RADIUS + config.edge - gap[..., 0], 0) + _price(xp, short, 1)
+    touches = _price(xp, FOOT_RADIUS + config.edge - view.clearance(foot), 0) + _price(xp, short, 1)
     return touches + _OUT_OF_REACH * too_far
 
 
@@ -168,19 +166,17 @@ _RATE_COST = 1.0
 _APART = 0.2
 """Phase by which a leg may leave the trot at a cost of 1."""
 
-_LEANS = tuple(np.arange(-3, 4) * 0.055)
-"""Offsets from Raibert's footholds for which a track is looked at [m]: the farther ahead of the hip a foot comes down,
-the farther back its shank leans."""
+LEANS = ALONG[3:-3].astype(np.float32)
+"""(7,) offsets from Raibert's footholds for which a track is looked at [m]: the farther ahead of the hip a foot comes
+down, the farther back its shank leans; from beyond them a leg reaches hardly anything."""
 
 
-def _tracks(xp: Any, nominal: Any, heading: Any, command: Any) -> tuple[Any, Any]:
-    """(n, 4, 217, 2) places along the track of each foot, once for each of ``_LEANS``, and (217,) these [m]."""
+def _tracks(xp: Any, nominal: Any, heading: Any, command: Any) -> Any:
+    """(n, 4, 1, 31, 2) places along the track of each foot [m]."""
     track = constant(xp, TRACK.astype(np.float32), nominal)
     course = command[:, :2] / xp.clip(_speed(xp, command), _LEAST_SPEED, None)[:, None]
     direction = turn(xp, heading, course[:, None] + 0 * nominal)
-    places = nominal[:, :, None] + direction[:, :, None] * track[:, None]
-    leans = constant(xp, np.repeat(_LEANS, len(TRACK)).astype(np.float32), nominal)
-    return xp.concatenate([places] * len(_LEANS), 2), leans
+    return (nominal[:, :, None] + direction[:, :, None] * track[:, None])[:, :, None]
 
 
 def _speed(xp: Any, command: Any) -> Any:
@@ -190,9 +186,9 @@ def _speed(xp: Any, command: Any) -> Any:
 def _choose_rates(xp: Any, config: GaitConfig, gait: GaitState, command: Any, feet: Any, blocked: Any) -> Any:
     """(n, 4) the rates at which the next footholds of every foot ask for the smallest offsets.
 
-    ``blocked`` (n, 4, 217) is what is in the way along the tracks; what a foothold would cost whose Raibert place is at
-    any of their places follows from it, and with that the cost of every rate, held for one stance. First a rate for all
-    legs together: they meet a bar in phase. Then one for each, which is drawn back to the trot.
+    ``blocked`` (n, 4, 7, 31) is what is in the way along the tracks; what a foothold would cost whose Raibert place is
+    at any of their places follows from it, and with that the cost of every rate, held for one stance. First a rate for
+    all legs together: they meet a bar in phase. Then one for each, which is drawn back to the trot.
     """
     if config.modulate == 0:
         return 0 * gait.rate + 1.0
@@ -226,11 +222,11 @@ def _choose_rates(xp: Any, config: GaitConfig, gait: GaitState, command: Any, fe
 def _cost_along_tracks(xp: Any, blocked: Any) -> Any:
     """(n, 4, 31) what a foothold costs whose Raibert place is there: the best of those it can be moved to."""
     spread, long = len(ALONG) // 2, len(TRACK)
-    by_lean = [blocked[..., k * long : (k + 1) * long] for k in range(len(_LEANS))]
+    by_lean = [blocked[..., k, :] for k in range(len(LEANS))]
     padded = [xp.concatenate([b[..., :1]] * spread + [b] + [b[..., -1:]] * spread, -1) for b in by_lean]
     cost = None
     for k, shift in enumerate(ALONG):
-        nearest = int(np.abs(np.array(_LEANS) - shift).argmin())
+        nearest = int(np.abs(LEANS - shift).argmin())
         window = padded[nearest][..., k : k + long] + float((shift / _WIDTH[0]) ** 2)
         cost = window if cost is None else xp.minimum(cost, window)
     return cost
