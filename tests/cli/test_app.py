@@ -36,6 +36,11 @@ def test_version(capsys: pytest.CaptureFixture[str]):
     assert capsys.readouterr().out.startswith("vinl 0.")
 
 
+def test_the_package_runs_as_the_command():
+    done = subprocess.run([sys.executable, "-m", "vinl", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("vinl 0.")
+
+
 def test_unknown_command_suggests_the_nearest(capsys: pytest.CaptureFixture[str]):
     assert app.main(["policy"]) == 2
     assert (
