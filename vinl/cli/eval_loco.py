@@ -71,13 +71,19 @@ def main(argv: list[str]) -> int:
     """Run the evaluation and print its figures."""
     options = parse_options(Options, argv, "eval-loco")
     from vinl.chain.choose import best_locomotor
+    from vinl.config.loader import closest
     from vinl.config.output import check_out, strip_command
+    from vinl.courses.grounds import TERRAINS
 
     if options.policy is not None and options.compare:
         raise InputError("--policy and --compare exclude each other; name all policies after --compare")
     names = list(options.compare) or [options.policy or best_locomotor()]
     if len(set(names)) < len(names):
         raise InputError(f"--compare names a policy twice: {' '.join(names)}")
+    known = (*TERRAINS, "bars")
+    if options.terrain not in known:
+        meant = closest(options.terrain, known)
+        raise InputError(f"--terrain {options.terrain!r} is unknown{meant}; known: {', '.join(known)}")
     foreign = _COURSES if options.terrain == "bars" else {**_BARS, "video": False}
     for name in foreign:
         if getattr(options, name) is not None and getattr(options, name) is not False:

@@ -58,13 +58,20 @@ def parse_options(options: type[T] | Any, argv: list[str], command: str, *marker
     said, settings = io.StringIO(), (tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone, *markers)
     try:
         with contextlib.redirect_stderr(said):
-            return tyro.cli(options, args=argv, prog=f"vinl {command}", config=settings)
+            parsed = tyro.cli(options, args=argv, prog=f"vinl {command}", config=settings)
     except SystemExit as end:
         if not end.code:
             raise
         raise InputError(
             f"{_say_plainly(said.getvalue(), options)} (vinl {command} --help lists the options)"
         ) from None
+    for word in getattr(parsed, "overrides", ()):
+        if "=" not in word:
+            raise InputError(
+                f"{word!r} is no setting (key=value), and a name stands behind its option (vinl {command} --help "
+                "lists the options)"
+            )
+    return parsed
 
 
 def settings_first(options: type[Any], argv: list[str]) -> list[str]:
