@@ -25,6 +25,7 @@ def test_config_says_who_is_trained_and_where_to(monkeypatch: pytest.MonkeyPatch
     names, counts, folders, devices = zip(*done, strict=True)
     assert names == ("LocoConfig", "LocoConfig", "NavConfig") and set(devices) == {"cpu"} and counts[0] == 8
     assert folders == ("runs/rough", "runs/rough-2", "here")
+    assert repr(runs[0]) == "Training(runs/rough: complete)"
     assert runs[0].complete and runs[0].metrics == [{"iteration": 1}]
 
 

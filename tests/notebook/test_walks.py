@@ -95,6 +95,7 @@ def test_what_is_shown_at_a_prompt_is_short(walk: vinl.Walk) -> None:
         assert len(repr(shown)) < 160 and "\n" not in repr(shown) and type(shown).__name__ in repr(shown)
     assert 'src="data:image/png;base64,iVBOR' in walk._repr_html_() and "harbour_flat" in walk._repr_html_()
     table = results._repr_html_()
+    assert "1 episode in 1 floor plan," in repr(results)
     assert table.count("<tr>") == 3 and "<td>harbour_flat</td><td>1</td>" in table
 
 

@@ -163,7 +163,8 @@ class Results:
         who = " + ".join(str(policy["name"]) for policy in self.policies.values())
         n, plans = len(self.episodes), len(self.plans)
         success = 100 * self.aggregate["success"]["mean"]
-        return f"Results({who}: {n} episodes in {plans} floor plans, success {success:.1f} %)"
+        walked = f"{n} episode{'s' * (n != 1)} in {plans} floor plan{'s' * (plans != 1)}"
+        return f"Results({who}: {walked}, success {success:.1f} %)"
 
     def _repr_html_(self) -> str:
         """Means by floor plan."""

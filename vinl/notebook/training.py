@@ -30,6 +30,9 @@ class Training:
     folder: Path
     complete: bool
 
+    def __repr__(self) -> str:
+        return f"Training({self.folder}: {'complete' if self.complete else 'interrupted'})"
+
     @property
     def policy(self) -> Policy:
         """What it has learned."""
