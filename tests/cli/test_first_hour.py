@@ -69,7 +69,7 @@ MISTAKES = {
     "eval tim_limit=1": "did you mean 'time_limit'",
     "eval --config loco/rough": "a config of locomotion, not of evaluation: use vinl train-loco",
     "eval harbour_flat": "'harbour_flat' is no setting (key=value), and a name stands behind its option",
-    "eval-loco --terrain bar": "'bar' is unknown, did you mean 'bars'?; known: flat, rough, blocks, litter, rooms, bars",
+    "eval-loco --terrain bar": "did you mean 'bars'?; known: flat, rough, blocks, litter, rooms, bars",
     "eval --floorplans harbor_flat": "did you mean 'harbour_flat'",
     "eval --out=": "--out is empty",
     "eval --out /proc/foo": "nothing can be written there",

@@ -26,6 +26,16 @@ def test_time_left_goes_by_the_pieces_of_this_session(done: int, before: int, el
     assert TimeLeft().render(make_task(done, before, elapsed)).plain == left
 
 
+def test_seconds_move_while_no_episode_has_ended() -> None:
+    said = io.StringIO()
+    with Progress(Console(file=said, width=80, force_terminal=True, color_system=None)) as progress:
+        progress.show("plan", 0, 1)
+        progress.show("walk", 0, 250)
+        progress.show("second", 12345, 31250)
+    last = [line for line in said.getvalue().splitlines() if "episodes" in line][-1]
+    assert last.endswith("12345 s walked") and len(last) <= 80
+
+
 def test_what_is_said_after_ctrl_c() -> None:
     console = Console(file=io.StringIO(), width=100)
     with pytest.raises(KeyboardInterrupt), Progress(console, "runs/a keeps them") as progress:
@@ -33,3 +43,8 @@ def test_what_is_said_after_ctrl_c() -> None:
         progress.show("walk", 3, 10)
         raise KeyboardInterrupt
     assert "stopped after 3 of 10 episodes; runs/a keeps them" in console.file.getvalue()  # type: ignore[attr-defined]
+    with pytest.raises(KeyboardInterrupt), Progress(console, "runs/b keeps them") as progress:
+        progress.show("plan", 0, 1)
+        progress.show("walk", 0, 10)
+        raise KeyboardInterrupt
+    assert "stopped after 0 of 10 episodes; nothing was written" in console.file.getvalue()  # type: ignore[attr-defined]

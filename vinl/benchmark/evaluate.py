@@ -182,8 +182,8 @@ def evaluate(
         workers: processes.
         films: which episodes are filmed: none, the first of every plan, or all of the first seed.
         out: folder for the films.
-        on_progress: called with what is going on, pieces done and pieces in all; by default a bar shows it on a
-            terminal and in a notebook.
+        on_progress: called with what is going on, pieces done and pieces in all, with ``"second"`` for every half
+            second that robots walked, of at most so many; by default a bar shows it on a terminal and in a notebook.
         cluster: address of a Ray cluster that walks the episodes in place of this machine, or ``"local"``;
             ``workers`` are then its CPUs.
 
@@ -206,10 +206,12 @@ def evaluate(
     if on_progress is not None:
         return evaluate_rows([row], protocol, workers, folders, on_progress=on_progress, cluster=cluster)[0]
     with show_line("episodes", "episodes") as show:
+        ended = 0, 1
 
         def note(what: str, done: int, total: int) -> None:
-            if what == "walk":
-                show(done, total)
+            nonlocal ended
+            ended = (done, total) if what == "walk" else ended
+            show(*ended)  # for every half second too: the clock of the bar goes on while no episode ends
 
         return evaluate_rows([row], protocol, workers, folders, on_progress=note, cluster=cluster)[0]
 
@@ -235,7 +237,7 @@ def evaluate_rows(
         keep: append every episode that ended to a file in the row's folder, and walk only those that are not there.
         fresh: forget what the folders hold of earlier runs.
         command: kept in the folders beside the episodes.
-        on_progress: called with what is going on, pieces done and pieces in all.
+        on_progress: see ``evaluate``.
         cluster: address of a Ray cluster that walks the episodes, see ``join_cluster``; None: this machine does.
 
     Raises:
@@ -267,13 +269,21 @@ def evaluate_rows(
             jobs += cut_jobs(k, row, protocol.plans, routes, wanted, missing, filmed, workers)
         jobs = longest_first(jobs, routes)
         total = len(wanted) * len(rows)
-        walked = itertools.count(total - sum(len(job.cells) for job in jobs) + 1)
+        lacking = sum(len(job.cells) for job in jobs)
+        walked = itertools.count(total - lacking + 1)
 
-        def add(row: int, episode: Episode) -> None:
-            stores[row].add(episode, time.perf_counter() - began)
-            on_progress("walk", next(walked), total)
+        simulated = 0.0
 
-        on_progress("walk", total - sum(len(job.cells) for job in jobs), total)
+        def add(row: int, piece: Episode | float) -> None:
+            nonlocal simulated
+            if isinstance(piece, Episode):
+                stores[row].add(piece, time.perf_counter() - began)
+                on_progress("walk", next(walked), total)
+            else:
+                simulated += piece
+                on_progress("second", round(simulated), round(lacking * protocol.config.time_limit))
+
+        on_progress("walk", total - lacking, total)
         shared = Shared(rows, protocol.plans, routes, protocol.config, protocol.record)
         pool = stack.enter_context(WorkerPool(min(here, max(len(jobs), 1)), shared))  # it starts at the first run
         units = pool.run(run_job, jobs, add) if joined is None else joined.run(shared, run_job, jobs, add)

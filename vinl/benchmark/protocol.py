@@ -23,6 +23,7 @@ from vinl.config.errors import InputError
 from vinl.config.loader import build_config, closest, dump_config, read_yaml
 from vinl.policies.policy import Policy
 from vinl.render.video import FilmJob, film, name_film
+from vinl.robot.aliengo import CONTROL_DT
 from vinl.world.clutter import CLUTTER
 from vinl.world.floorplan import FloorPlan
 from vinl.world.free_space import FreeSpace
@@ -264,7 +265,8 @@ def longest_first(jobs: Sequence[Job], routes: Sequence[Sequence[StartGoal]]) ->
 
 
 def run_job(context: Context, job: Job) -> dict[Key, Episode]:
-    """One piece of work, in whatever process; each episode is told when it has ended.
+    """One piece of work, in whatever process; each episode is told when it has ended, and before every decision how
+    long its robots have walked since the last: those that walk side by side end late and all at once.
 
     Returns:
         The episodes that are to be filmed.
@@ -275,6 +277,18 @@ def run_job(context: Context, job: Job) -> dict[Key, Episode]:
     setups = [draw_setup(plan, routes[k], k, seed, clutter, config) for seed, k in job.cells]
     rows = [number for number, cell in enumerate(job.cells) if cell in job.filmed]
     tell: Callable[[Episode], None] = lambda episode: context.report(job.row, episode)  # noqa: E731
+    walking = len(setups)
+
+    def end(episode: Episode) -> None:
+        nonlocal walking
+        walking -= 1
+        if not job.at_once:
+            tell(episode)
+
+    def is_stopped() -> bool:
+        context.report(job.row, walking * config.navigation_period * CONTROL_DT)
+        return context.is_stopped()
+
     done = run_episodes(
         plan,
         setups,
@@ -282,8 +296,8 @@ def run_job(context: Context, job: Job) -> dict[Key, Episode]:
         row.navigator,
         config,
         range(len(setups)) if shared.record else rows,
-        (lambda _: None) if job.at_once else tell,
-        context.is_stopped,
+        end,
+        is_stopped,
     )
     if job.at_once:
         for episode in done:

@@ -13,6 +13,10 @@ from rich.text import Text
 _TITLES = {"plan": "floor plans", "walk": "episodes", "film": "films", "robot": "robots", "crossing": "crossings"}
 
 
+_BAR = 24
+"""Width of the bar: at 80 columns there is room for what stands beside it."""
+
+
 class TimeLeft(ProgressColumn):
     """Time left, by how long the pieces of this session took on average.
 
@@ -42,20 +46,25 @@ class Progress:
         self._console, self._kept = console, kept
         self._bar = Bar(
             TextColumn("{task.description:<12}"),
-            BarColumn(),
+            BarColumn(_BAR),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeLeft(),
+            TextColumn("{task.fields[note]}"),
             console=console,
         )
         self._tasks: dict[str, TaskID] = {}
         self._counts: dict[str, tuple[int, int]] = {}
 
     def show(self, what: str, done: int, total: int) -> None:
-        """So many pieces of a kind of work are done; those of the first call were done before."""
+        """So many pieces of a kind of work are done; those of the first call were done before. Seconds stand beside the
+        episodes: something moves while none has ended."""
+        if what == "second":
+            self._bar.update(self._tasks["walk"], note=f"{done} s walked")
+            return
         if what not in self._tasks:
-            self._tasks[what] = self._bar.add_task(_TITLES.get(what, what), total=total, before=done)
+            self._tasks[what] = self._bar.add_task(_TITLES.get(what, what), total=total, before=done, note="")
         self._counts[what] = done, total
         # the bar counts plans before each is looked at, the others after each piece
         self._bar.update(self._tasks[what], completed=done + (what == "plan"))
@@ -68,4 +77,5 @@ class Progress:
         self._bar.stop()
         if kind is KeyboardInterrupt:
             done = ", ".join(f"{d} of {t} {_TITLES.get(w, w)}" for w, (d, t) in self._counts.items() if w != "plan")
-            self._console.print(f"stopped after {done or 'nothing'}; {self._kept}", soft_wrap=True)
+            kept = self._kept if any(d for w, (d, _) in self._counts.items() if w != "plan") else "nothing was written"
+            self._console.print(f"stopped after {done or 'nothing'}; {kept}", soft_wrap=True)
