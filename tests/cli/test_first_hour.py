@@ -217,4 +217,4 @@ def test_names_of_compared_policies_stay_whole_at_80_columns() -> None:
     results = TrialResults([], aggregate, {}, {"ground": {"terrain": "blocks"}}, 0.0)
     said = io.StringIO()
     print_comparison(Console(width=80, file=said), dict.fromkeys(names, results))
-    assert " no_pretraining " in said.getvalue()
+    assert " no_pretraining " in said.getvalue() and "CoT: cost of transport" in said.getvalue()

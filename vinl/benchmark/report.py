@@ -15,7 +15,15 @@ from vinl.chain.metrics import FAILURES, read_failure
 from vinl.chain.records import EpisodeRecord, Results
 from vinl.config.loader import load_config
 from vinl.config.output import describe_environment
-from vinl.render.drawing import POINT_DT, draw_histogram, draw_map, format_number, open_table, render_page
+from vinl.render.drawing import (
+    POINT_DT,
+    draw_histogram,
+    draw_map,
+    format_number,
+    open_table,
+    print_fitting,
+    render_page,
+)
 
 _SHOWN = ("vinl", "vinl_no_clutter", "rough")
 """Rows of the paper's table that every report shows."""
@@ -125,7 +133,7 @@ def print_summary(console: Console, results: Results, out: Path) -> None:
         table.add_row(plan.name, *_summarise(aggregate_episodes(records, min_metres)))
     table.add_section()
     table.add_row("all", *_summarise(results.aggregate), style="bold")
-    console.print(table)
+    print_fitting(console, table, ("s", "leg/m", "metres"))
     success, rate = results.aggregate["success"], results.aggregate["foot_collisions_per_m"]
     console.print(
         f"success {_format_spread(success, 1, 100)} %, foot collisions {_format_spread(rate, 2)} per metre",

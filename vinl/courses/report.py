@@ -159,6 +159,11 @@ _GAIT = (
 )
 """Figures of the gait: name, title, factor, digits."""
 
+_GAIT_WORDS = (
+    "CoT: cost of transport; leg-leg: steps with a leg on a leg; steps with a joint too fast, feet close, a foot above "
+    "its hip; peak: fastest joint, in its limit; gap: least between two feet"
+)
+
 _SPREAD = ("foot_block_per_m", "leg_block_per_m", "dirty_steps", "dirty_foot_steps")
 """Figures whose interval the table shows, as half its width."""
 
@@ -230,6 +235,7 @@ def print_gait(console: Console, figures: Mapping[str, Mapping[str, Any]]) -> No
     for name, own in figures.items():
         table.add_row(name, *[format_number(own.get(key), digits, factor) for key, _, factor, digits in _GAIT])
     console.print(table)
+    console.print(_GAIT_WORDS, soft_wrap=True)
 
 
 def _print_heights(console: Console, compared: Mapping[str, TrialResults[RobotRecord]]) -> None:

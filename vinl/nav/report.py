@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from vinl.chain.metrics import summarise
-from vinl.render.drawing import draw_histogram, open_table, outline_boxes, outline_path, render_page
+from vinl.render.drawing import draw_histogram, open_table, outline_boxes, outline_path, print_fitting, render_page
 from vinl.robot.aliengo import LENGTH
 from vinl.world.boxes import Blocks, Boxes
 from vinl.world.endings import SUCCESS
@@ -132,7 +132,7 @@ def print_navigation_summary(console: Console, data: dict[str, Any]) -> None:
         table.add_row(name, *_cells(kind["aggregate"]))
     table.add_section()
     table.add_row("all", *_cells(data["aggregate"]), style="bold")
-    console.print(table)
+    print_fitting(console, table, ("s", "hits", "95 %"))
 
 
 def format_interval(figure: dict[str, Any], digits: int = 3, factor: float = 1.0) -> str:

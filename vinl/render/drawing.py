@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from PIL import Image
 from rich import box
+from rich.console import Console
 from rich.table import Table
 
 from vinl.chain.records import Episode, EpisodeTrace
@@ -189,6 +190,16 @@ def open_table(first: str, columns: Iterable[str], **options: Any) -> Table:
     for title in columns:
         table.add_column(title, justify="right", no_wrap=True)
     return table
+
+
+def print_fitting(console: Console, table: Table, spared: Iterable[str]) -> None:
+    """Print a table of ``open_table``. In a narrow terminal, columns titled as in ``spared`` are left out, the first
+    ones first, until names and the other figures stand there whole."""
+    for title in spared:
+        if console.measure(table, options=console.options.update(width=1000)).maximum <= console.width:
+            break
+        table.columns = [column for column in table.columns if column.header != title]
+    console.print(table)
 
 
 def format_number(value: float | None, digits: int = 2, factor: float = 1.0, sign: str = "", unit: str = "") -> str:
