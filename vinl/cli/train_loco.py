@@ -67,7 +67,10 @@ def main(argv: list[str]) -> int:
             raise InputError(f"--stage {options.stage}: {source} is a config of stage {config.stage}")
         folder = options.out or f"runs/{source.removesuffix('.yaml').split('/')[-1]}"
     check_out(folder)
-    from vinl.loco.training import train_locomotor
+    from rich.console import Console
+
+    with Console(stderr=True).status("loading JAX and the simulator"):  # some seconds; says nothing where it is piped
+        from vinl.loco.training import train_locomotor
 
     options.start_logger(folder)
     try:
