@@ -1,23 +1,29 @@
 """What a new user meets first: help, lists, mistakes, and where results go."""
 
+import errno
 import io
 import json
 import re
 import resource
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from rich.console import Console
 
 from vinl.cli.app import COMMANDS, main
 from vinl.cli.options import default_out
+from vinl.cli.training import TrainingOptions
 from vinl.config.errors import InputError
 from vinl.courses.evaluate import TrialResults
 from vinl.courses.report import _COLUMNS, print_comparison
 from vinl.nav.training import describe_figures
+from vinl.render.film_file import write_film
 from vinl.rl.loop import TrainingProgress
 from vinl.rl.machine import explain_out_of_memory
 from vinl.rl.run_folder import RunFolder
@@ -192,6 +198,38 @@ def test_a_checkpoint_that_does_not_fit_leaves_the_old_one(tmp_path: Path) -> No
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert [file.name for file in tmp_path.iterdir()] == ["checkpoint.pt"]
     assert run.load_checkpoint() == {"iteration": 1}
+
+
+def test_a_film_on_a_full_disk_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """ffmpeg dies, of which Python hears that a pipe is broken."""
+
+    def die(*_, **__):
+        yield
+        raise OSError("Broken pipe\n\nFFMPEG COMMAND ...")
+
+    monkeypatch.setattr("imageio_ffmpeg.write_frames", die)
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=4096))
+    with pytest.raises(OSError, match=r"No space left on device: .*film\.mp4") as full:
+        write_film([np.zeros((16, 16, 3), np.uint8)], tmp_path / "film.mp4", 10.0)
+    assert full.value.errno == errno.ENOSPC
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=2**30))
+    with pytest.raises(OSError, match="Broken pipe"):
+        write_film([np.zeros((16, 16, 3), np.uint8)], tmp_path / "film.mp4", 10.0)
+
+
+def test_the_thread_that_writes_curves_prints_no_traceback_of_a_full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    heard: list[object] = []
+    monkeypatch.setattr(threading, "excepthook", lambda what: heard.append(what.exc_value))
+    TrainingOptions().start_logger("run")
+
+    def fail(error: Exception) -> None:
+        raise error
+
+    for error in (OSError(errno.ENOSPC, "No space left on device"), ValueError("another")):
+        thread = threading.Thread(target=fail, args=[error])
+        thread.start()
+        thread.join()
+    assert [type(error) for error in heard] == [ValueError]
 
 
 @pytest.mark.slow

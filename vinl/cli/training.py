@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
@@ -83,11 +84,24 @@ class TrainingOptions:
         Raises:
             InputError: the logger is not installed.
         """
+        _hush_writer()
         if self.logger == "tensorboard":
             return
         try:
             import wandb  # pyright: ignore[reportMissingImports]  (an extra of its own)
         except ModuleNotFoundError:
-            raise InputError("--logger wandb: it is not installed; pip install wandb") from None
+            raise InputError('--logger wandb: it is not installed; pip install "vinl[wandb]"') from None
         Path(folder).mkdir(parents=True, exist_ok=True)
         wandb.init(project="vinl", name=Path(folder).name, dir=folder, sync_tensorboard=True)
+
+
+def _hush_writer() -> None:
+    """A thread writes TensorBoard's files. What stops it, such as a full disk, is raised at the next figure too and
+    told in one line: the thread need not print a traceback of its own."""
+    before = threading.excepthook
+
+    def tell(what: threading.ExceptHookArgs) -> None:
+        if not isinstance(what.exc_value, OSError):
+            before(what)
+
+    threading.excepthook = tell

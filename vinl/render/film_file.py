@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageDraw, ImageFont
+
+_ROOM = 2**20
+"""Where less is free, the disk is full for a film [bytes]."""
 
 
 def write_caption(frame: UInt8[np.ndarray, "height width 3"], text: str) -> UInt8[np.ndarray, "height width 3"]:
@@ -24,6 +30,9 @@ def write_film(frames: Iterable[UInt8[np.ndarray, "height width 3"]], path: Path
         frames: pictures, all of one size; width and height are multiples of 16.
         path: ``.mp4`` or ``.gif``.
         rate: pictures a second.
+
+    Raises:
+        OSError: the disk is full, or nothing can be written there.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     scratch, writer = path.with_name(f".{path.name}"), None
@@ -43,13 +52,18 @@ def write_film(frames: Iterable[UInt8[np.ndarray, "height width 3"]], path: Path
                         size,
                         fps=rate,  # type: ignore[arg-type]
                         quality=6,
-                        ffmpeg_log_level="error",
+                        ffmpeg_log_level="fatal",
                     )
                     writer.send(None)
                 writer.send(np.ascontiguousarray(frame))
             if writer is not None:
                 writer.close()
         scratch.replace(path)
+    except OSError as error:
+        # all that is known of an ffmpeg that has died is that it takes no more pictures
+        if shutil.disk_usage(path.parent).free > _ROOM:
+            raise
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path)) from error
     finally:
         if writer is not None:
             writer.close()
