@@ -4,6 +4,7 @@ import ast
 import json
 import re
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,21 @@ def test_notebooks_show_what_their_code_gave(path: Path) -> None:
 def test_notebooks_hold_a_film_and_tables() -> None:
     whole = "".join(path.read_text() for path in NOTEBOOKS)
     assert "data:video/mp4;base64," in whole and whole.count("<table") >= 4
+
+
+def test_notebooks_need_nothing_that_their_extra_leaves_out() -> None:
+    """Of what cells import, and what they train with."""
+    project = tomllib.loads((NOTEBOOKS[0].parents[1] / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    assert "vinl[train]" in extras["notebooks"]
+    wanted = [*project["dependencies"], *extras["train"], *extras["notebooks"]]
+    installed = {re.split(r"[^\w-]", package)[0].lower() for package in wanted} | {"pil"}  # pillow
+    for path in NOTEBOOKS:
+        code = "\n".join(
+            "".join(c["source"]) for c in json.loads(path.read_text())["cells"] if c["cell_type"] == "code"
+        )
+        named = set(re.findall(r"^(?:import|from) (\w+)", code, re.MULTILINE))
+        assert {name.lower() for name in named} - set(sys.stdlib_module_names) <= installed, path.name
 
 
 def test_there_are_notebooks() -> None:
