@@ -30,7 +30,7 @@ from corpus import Reader, make_readers
 
 from vinl.config.errors import InputError
 
-FILES = 800
+FILES = 2000
 """Damaged files of each kind."""
 
 SECONDS = 5.0

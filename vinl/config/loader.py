@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import difflib
 import re
@@ -254,11 +255,13 @@ def find_config(name_or_path: str | Path, beside: Path | None = None) -> Path:
     shipped = [configs_dir() / name] if not is_path else []
     candidates = ([beside / name] if beside else []) + shipped + ([Path(text)] if is_path else [])
     for candidate in candidates:
-        if candidate.is_file():
-            return candidate
+        with contextlib.suppress(OSError):  # no system takes a name of 300 letters
+            if candidate.is_file():
+                return candidate
     if is_path:
-        folder = Path(text).parent
-        there = sorted(p.name for p in folder.glob("*.y*ml")) if folder.is_dir() else []
+        folder, there = Path(text).parent, []
+        with contextlib.suppress(OSError):
+            there = sorted(p.name for p in folder.glob("*.y*ml")) if folder.is_dir() else []
         found = f"{folder} holds {', '.join(there)}" if there else f"there is no YAML file in {folder}"
         raise InputError(f"config {text} does not exist; {found}")
     names = list_configs()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ def _read_opening(door: dict[str, Any], walls: dict[str, Wall]) -> Opening | Non
         low, high = sorted((float(box["min"]["x"]), float(box["max"]["x"])))
         top = float(box["max"].get("y", DOOR_HEIGHT))
     start, end = np.array(wall.start), np.array(wall.end)
-    length = float(np.linalg.norm(end - start))
+    length = math.hypot(*(end - start))  # of any floats: their squares may be none
     if length < 1e-6:
         return None
     if mirrored:
