@@ -200,6 +200,16 @@ def test_a_checkpoint_that_does_not_fit_leaves_the_old_one(tmp_path: Path) -> No
     assert run.load_checkpoint() == {"iteration": 1}
 
 
+def test_wandb_reads_along(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[dict] = []
+    monkeypatch.setitem(sys.modules, "wandb", SimpleNamespace(init=lambda **how: begun.append(how)))
+    TrainingOptions(logger="wandb").start_logger("runs/mine")
+    assert begun == [{"project": "vinl", "name": "mine", "dir": "runs/mine", "sync_tensorboard": True}]
+    monkeypatch.setitem(sys.modules, "wandb", None)
+    with pytest.raises(InputError, match=r'pip install "vinl\[wandb\]"'):
+        TrainingOptions(logger="wandb").start_logger("runs/mine")
+
+
 def test_a_film_on_a_full_disk_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """ffmpeg dies, of which Python hears that a pipe is broken."""
 

@@ -31,10 +31,10 @@ class Options:
     """Files (.png, .pgm, ROS .yaml, ProcTHOR .json or .jsonl.gz:17) or names of shipped plans; all shipped ones by
     default."""
     loco: str | None = None
-    """Locomotor: a shipped policy's name, a policy folder or a training run (default: loco)."""
+    """Locomotion policy: a shipped one's name, a policy folder or a training run (default: loco)."""
     nav: str | None = None
-    """Navigator: a shipped navigation policy's name, a policy folder, a training run, or oracle, which follows the
-    shortest way (default: nav). With --table it takes the place of the learned navigator of all rows."""
+    """Navigation policy: a shipped one's name, a policy folder, a training run, or oracle, which follows the shortest
+    way (default: nav). With --table it takes the place of the learned one of all rows."""
     episodes: int = 10
     """Start/goal pairs in each plan; the same for all seeds."""
     routes: str | None = None

@@ -11,11 +11,11 @@ from vinl.config.errors import InputError
 
 @dataclass(frozen=True)
 class Options:
-    """Drive a navigator to goals in the kinematic environment and measure success, SPL and collisions: results.json
-    and report.html."""
+    """Drive a navigation policy to goals in the kinematic environment and measure success, SPL and collisions:
+    results.json and report.html."""
 
     policy: str = "nav"
-    """A shipped navigator's name, the folder of a policy or run, or oracle: the path follower of vinl eval."""
+    """A shipped navigation policy's name, the folder of a policy or run, or oracle: the path follower of vinl eval."""
     out: str | None = None
     """Folder for results.json and report.html (default: runs/eval-nav- and the policy)."""
     floorplans: tuple[str, ...] = ()

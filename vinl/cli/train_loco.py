@@ -13,8 +13,8 @@ from vinl.config.errors import InputError
 
 @dataclass(frozen=True)
 class Options(TrainingOptions):
-    """Train a locomotor in MJX, with PPO or, in stage 3, from a teacher. The run's folder holds checkpoint, curves
-    and, at any time, the policy.
+    """Train a locomotion policy in MJX, with PPO or, in stage 3, from a teacher. The run's folder holds checkpoint,
+    curves and, at any time, the policy.
 
     Ctrl-C saves and stops; --resume goes on. Any setting of the config can be given as key=value, for example
     ppo.epochs=3 or commands.forward='[0, 1]'.

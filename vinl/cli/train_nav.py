@@ -16,8 +16,8 @@ from vinl.config.errors import InputError
 
 @dataclass(frozen=True)
 class Options(TrainingOptions):
-    """Train a navigator with PPO in generated homes. The run's folder holds checkpoint, curves and, at any time, the
-    policy.
+    """Train a navigation policy with PPO in generated homes. The run's folder holds checkpoint, curves and, at any
+    time, the policy.
 
     Ctrl-C saves and stops; --resume goes on. Any setting of the config can be given as key=value, for example
     ppo.epochs=1 or motion.amplitude=[0,1].
