@@ -29,7 +29,7 @@ from vinl.sensing.depth import check_device
 from vinl.sensing.odometry import Odometry
 from vinl.sensing.preparation import settle_missing
 from vinl.sensing.sensor import DepthSensor
-from vinl.sensing.structs import allocate_struct
+from vinl.sensing.torch_warp import allocate_struct, launch
 
 _DRAWN_AT_START, _DRAWN_AT_LOOK = 1, 3
 """Rows of random numbers of a step: what the cameras are drawn from, and their images' errors."""
@@ -331,11 +331,7 @@ class NavEnvironment:
         return depth, vector
 
     def _launch(self, kernel: Any, dim: int | tuple[int, ...], inputs: list[Any]) -> None:
-        stream = None
-        if self.device.type == "cuda":
-            stream = wp.stream_from_torch(torch.cuda.current_stream(self.device))
-        arrays = [self._wrapped[x] if isinstance(x, str) else x for x in inputs]
-        wp.launch(kernel, dim=dim, inputs=arrays, device=str(self.device), stream=stream)
+        launch(kernel, dim, [self._wrapped[x] if isinstance(x, str) else x for x in inputs], self.device)
 
     def _zeros(self, *shape: int, dtype: torch.dtype = torch.float32) -> Tensor:
         return torch.zeros(*shape, dtype=dtype, device=self.device)

@@ -20,6 +20,7 @@ from vinl.nav.config import NavConfig
 from vinl.nav.home_builder import BuiltHome, HomeRecord, build_home, build_plan, prepare_home
 from vinl.nav.kernels import Homes
 from vinl.sensing.depth import build_mesh, check_device
+from vinl.sensing.torch_warp import find_stream
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers import check_file, expand_paths
 
@@ -198,8 +199,7 @@ class HomeStore:
         return {"seeds": [record.seed for record in self.records], "names": [record.name for record in self.records]}
 
     def _build_mesh(self, home: BuiltHome, tree: str | None) -> wp.Mesh:
-        on_gpu = self.device.type == "cuda"  # in order with torch's work, which reads the mesh
-        with wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(self.device)) if on_gpu else None):
+        with wp.ScopedStream(find_stream(self.device)):  # in order with torch's work, which reads the mesh
             return build_mesh(home.vertices, home.faces, str(self.device), tree)
 
 
