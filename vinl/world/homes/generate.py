@@ -69,14 +69,9 @@ def keep_connected(
         free = floor.copy()
         for k in kept:
             free.flat[cells[k]] = False
-        fits = measure_clearance(free, frame.resolution) >= CHECKED_RADIUS
-        regions = label_regions(fits)
-        if not regions.any():
+        regions, sizes, main, reached = _find_reached(free, frame, windows, owners)
+        if not main:
             return None
-        sizes = np.bincount(regions.ravel())
-        sizes[0] = 0
-        main = int(sizes.argmax())
-        reached = {owner for owner, where in zip(owners, windows, strict=True) if (regions[where] == main).any()}
         lost = set(range(len(rooms))) - reached
         bad = {int(k) for k in np.flatnonzero(sizes * frame.resolution**2 >= POCKET)} - {main}
         gone: set[int] = set()
@@ -92,7 +87,7 @@ def keep_connected(
         if not gone:
             return None if lost else [pieces[k] for k in sorted(kept)]
         kept -= gone
-    return [] if _joined(floor, frame, windows, owners) else None
+    return [] if _find_reached(floor, frame, windows, owners)[3] == set(owners) else None
 
 
 def paint_rects(rects: list[Rect], frame: GridFrame) -> Bool[np.ndarray, "rows columns"]:
@@ -138,12 +133,16 @@ def _blame(regions: np.ndarray, main: int, bad: set[int], cells: list, kept: set
     return gone
 
 
-def _joined(floor: np.ndarray, frame: GridFrame, windows: list[tuple[slice, slice]], owners: list[int]) -> bool:
-    regions = label_regions(measure_clearance(floor, frame.resolution) >= CHECKED_RADIUS)
-    if not regions.any():
-        return False
-    main = int(np.bincount(regions.ravel())[1:].argmax()) + 1
-    return {o for o, where in zip(owners, windows, strict=True) if (regions[where] == main).any()} == set(owners)
+def _find_reached(
+    free: np.ndarray, frame: GridFrame, windows: list[tuple[slice, slice]], owners: list[int]
+) -> tuple[np.ndarray, np.ndarray, int, set[int]]:
+    """The regions that a robot can walk in, their sizes, the largest of them (0: none), and the rooms in it."""
+    regions = label_regions(measure_clearance(free, frame.resolution) >= CHECKED_RADIUS)
+    sizes = np.bincount(regions.ravel())
+    sizes[0] = 0
+    main = int(sizes.argmax())
+    rooms = {k for k, where in zip(owners, windows, strict=True) if main and (regions[where] == main).any()}
+    return regions, sizes, main, rooms
 
 
 ATTEMPTS = 100
