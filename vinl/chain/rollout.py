@@ -9,12 +9,11 @@ import numpy as np
 from vinl.chain.batching import ask_only, batch_navigator, batch_policy
 from vinl.chain.config import EvaluationConfig, FaultConfig
 from vinl.chain.controller import open_controller
-from vinl.chain.depth_cameras import open_depth_cameras
+from vinl.chain.depth_cameras import CameraErrors, open_depth_cameras
 from vinl.chain.episode import EpisodeSetup, Recorder, draw_faults, sensor_key
 from vinl.chain.metrics import tracking_errors
 from vinl.chain.navigators.base import Navigator, Task, decide
 from vinl.chain.navigators.learned import DeadReckoning
-from vinl.chain.real_cameras import CameraErrors
 from vinl.chain.records import Episode
 from vinl.chain.robot import FaultyState, Robot, Robots, change_body
 from vinl.chain.scene import build_scene

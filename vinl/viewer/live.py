@@ -14,10 +14,9 @@ from jaxtyping import Float
 from vinl.chain.choose import check_cameras, choose_locomotor, load_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.controller import open_controller
-from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
+from vinl.chain.depth_cameras import CameraErrors, DepthCameras, RealCameras, open_depth_cameras
 from vinl.chain.navigators.base import Navigator, Task, decide
 from vinl.chain.navigators.learned import DeadReckoning
-from vinl.chain.real_cameras import CameraErrors, RealCameras
 from vinl.chain.robot import KINDS, FaultyState, Robot, change_body
 from vinl.chain.scene import FORCE_SENSORS, build_scene
 from vinl.config.errors import InputError
