@@ -170,14 +170,8 @@ class RobotShape:
         return self._data.xpos[1:].copy(), self._data.xmat[1:].reshape(-1, 3, 3).copy()
 
 
-def robot_bodies(model: mujoco.MjModel | None = None) -> list[BodyMesh]:
-    """The visual meshes of the robot, each in the frame of the body that carries it.
-
-    Args:
-        model: a compiled robot with visual meshes; a fresh one by default.
-    """
-    if model is None:
-        model = robot_spec("primitives", visual=True).compile()
+def robot_bodies(model: mujoco.MjModel) -> list[BodyMesh]:
+    """The visual meshes of a compiled robot, each in the frame of the body that carries it."""
     found = []
     for geom in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH):
         mesh = model.geom_dataid[geom]
