@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from importlib.metadata import version
 from typing import Any
@@ -93,6 +94,11 @@ def describe_step(policy: LocomotionPolicy | DepthPolicy, step: Step) -> dict[st
         **(_describe_navigation(card) if card.kind == "navigation" else _describe_locomotion(card)),
         **({} if policy.camera is None else _describe_camera(policy.camera)),
     }
+
+
+def read_metadata(properties: dict[str, str]) -> dict[str, Any]:
+    """The metadata as it was, from what a runtime or ``onnx`` reads from the file."""
+    return {key: json.loads(value) for key, value in properties.items()}
 
 
 def _describe_locomotion(card: PolicyCard) -> dict[str, Any]:
