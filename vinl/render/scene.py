@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import mujoco
 import numpy as np
@@ -12,6 +11,7 @@ from jaxtyping import Float, Int
 
 from vinl.robot.model import robot_spec
 from vinl.world.boxes import Blocks, Boxes
+from vinl.world.floorplan import FloorPlan
 from vinl.world.grid import GridFrame
 from vinl.world.mesh import TRIANGLES_PER_BOX, box_mesh, join_meshes
 
@@ -28,20 +28,6 @@ FURNITURE = (
     (0.48, 0.53, 0.62),
 )
 """Muted, so that robot and blocks stand out."""
-
-
-@runtime_checkable
-class Home(Protocol):
-    """What a picture needs of a floor plan."""
-
-    @property
-    def walls(self) -> Boxes: ...
-
-    @property
-    def furniture(self) -> Boxes: ...
-
-    @property
-    def frame(self) -> GridFrame: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +71,7 @@ def plain_scene(
 
 
 def plan_scene(
-    plan: Home,
+    plan: FloorPlan,
     blocks: Blocks | None = None,
     goal: tuple[float, float] | None = None,
     wall_height: float = 1.0,
