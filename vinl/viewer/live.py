@@ -6,7 +6,6 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -52,16 +51,6 @@ SNAP = 0.5
 
 _PATH_EVERY = 5
 _LIMBS = ("foot", "leg", "trunk")
-
-
-@runtime_checkable
-class TellsFootholds(Protocol):
-    """A policy or navigator that knows where the feet are to come down."""
-
-    def footholds(self) -> dict[str, Float[np.ndarray, "n 4 3"]]:
-        """``planned`` and ``predicted`` footholds, as far as there are such, in the heading frames that the robots had
-        when they were last asked [m]: the origin in the middle of the trunk, x along its heading, z up."""
-        ...
 
 
 class LiveChain:
@@ -356,11 +345,10 @@ class LiveChain:
 
     def _read_footholds(self) -> Footholds:
         """What the policies tell of their footholds, in the world frame; before the robot moves on."""
-        found: dict[str, np.ndarray] = {}
-        for one in (self._controller, self._locomotion):
-            if isinstance(one, TellsFootholds):
-                found.update({name: self._in_world(points[0]) for name, points in one.footholds().items()})
-        return Footholds(found.get("planned"), found.get("predicted"))
+        tell = getattr(self._locomotion, "footholds", dict[str, np.ndarray])  # policies may have such a method
+        found = self._controller.footholds() | tell()
+        places = {name: self._in_world(points[0]) for name, points in found.items()}
+        return Footholds(places.get("planned"), places.get("predicted"))
 
     def _in_world(self, points: Float[np.ndarray, "4 3"]) -> Float[np.ndarray, "4 3"]:
         c, s = np.cos(self._yaw), np.sin(self._yaw)
