@@ -61,6 +61,7 @@ def main(argv: list[str]) -> int:
     from rich.console import Console
 
     from vinl.config.output import SCHEMA, check_out, describe_environment, strip_command, write_json, write_text
+    from vinl.nav.environment import STUCK_STEPS
     from vinl.nav.evaluation import (
         END_REASONS,
         NavEvaluation,
@@ -70,7 +71,6 @@ def main(argv: list[str]) -> int:
         evaluate_kind,
         load_navigator,
     )
-    from vinl.nav.measures import STUCK_STEPS
     from vinl.nav.report import (
         aggregate_by_distance,
         aggregate_navigation,

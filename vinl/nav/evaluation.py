@@ -22,9 +22,8 @@ from vinl.config.errors import InputError
 from vinl.config.limits import check_fields, check_number
 from vinl.config.loader import build_config, load_config
 from vinl.nav.config import EpisodeConfig, NavCameraConfig, NavConfig
-from vinl.nav.environment import NavEnvironment
+from vinl.nav.environment import EpisodeEnd, NavEnvironment
 from vinl.nav.home_store import HomeStore
-from vinl.nav.measures import EpisodeEnd
 from vinl.policies.card import PolicyCard, find_previous
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
