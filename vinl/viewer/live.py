@@ -16,8 +16,8 @@ from vinl.chain.controller import open_controller
 from vinl.chain.depth_cameras import CameraErrors, DepthCameras, RealCameras, open_depth_cameras
 from vinl.chain.navigators.base import Navigator, Task, decide
 from vinl.chain.navigators.learned import DeadReckoning
-from vinl.chain.robot import KINDS, FaultyState, Robot, change_body
-from vinl.chain.scene import FORCE_SENSORS, build_scene
+from vinl.chain.robot import KINDS, FaultyState, Robot, build_model
+from vinl.chain.scene import FORCE_SENSORS
 from vinl.config.errors import InputError
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, FOOT_GEOMS
@@ -51,6 +51,13 @@ SNAP = 0.5
 
 _PATH_EVERY = 5
 _LIMBS = ("foot", "leg", "trunk")
+
+
+def look_through(
+    cameras: Mapping[str, DepthCameras | RealCameras], qpos: Float[np.ndarray, "1 19"]
+) -> dict[str, DepthImage]:
+    """What one robot's cameras see, by name."""
+    return {name: DepthImage(one.camera, one.look(qpos)[0].numpy().copy()) for name, one in cameras.items()}
 
 
 class LiveChain:
@@ -109,7 +116,8 @@ class LiveChain:
             case PlaceRobot(x, y):
                 self._place(np.array([x, y]))
             case ToggleBlock(x, y):
-                self._toggle_block(np.array([x, y]))
+                xy, world = np.array([x, y]), self.world
+                self._rebuild(world.without_block(xy) or world.with_block(draw_block(xy, self._rng), self._xy))
             case ScatterClutter(preset):
                 self._rebuild(self.world.scattered(preset, self._rng, self._xy))
                 return f"{len(self.world.blocks)} blocks"
@@ -154,10 +162,7 @@ class LiveChain:
         """The present moment. ``look``: render depth images anew."""
         if look or not self._images:
             qpos = self._walker.qpos[None]
-            self._images = {
-                name: DepthImage(camera.camera, camera.look(qpos)[0].numpy().copy())
-                for name, camera in self._cameras.items()
-            }
+            self._images = look_through(self._cameras, qpos)
         data = self._walker.data
         return Snapshot(
             world=self.world,
@@ -283,11 +288,8 @@ class LiveChain:
 
     def _build(self, world: World) -> None:
         """Physics, height scan and cameras of a world."""
-        kp, kd = (float(self._locomotion.card.action[key]) for key in ("kp", "kd"))
         faults, blocks, ceiling = self._config.faults, [world.blocks], self._config.ceiling
-        boxes = (world.plan.boxes, world.blocks.boxes())
-        model = build_scene(*boxes, kp=kp * faults.kp_scale, kd=kd * faults.kd_scale)
-        change_body(model, faults)
+        model = build_model(world.plan.boxes, world.blocks.boxes(), self._locomotion.card, faults)
         self._walker = Robot(model, faults.delay_steps)
         self._controller = open_controller(self._locomotion, world.plan, blocks, ceiling, self._errors)
         ideal = {
@@ -312,9 +314,6 @@ class LiveChain:
         self._controller.take_over(controller)
         self._walker.take_over(walker)
         self._images, self._footholds = {}, Footholds()
-
-    def _toggle_block(self, xy: Float[np.ndarray, "2"]) -> None:
-        self._rebuild(self.world.without_block(xy) or self.world.with_block(draw_block(xy, self._rng), self._xy))
 
     # ---- the policies ----------------------------------------------------------------------------------------------
 

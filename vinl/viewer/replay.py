@@ -15,7 +15,7 @@ from vinl.robot.aliengo import FOOT_GEOMS
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
 from vinl.robot.model import robot_spec
 from vinl.robot.rotation import wrap_angle, yaw_of
-from vinl.viewer.live import CONTACT_MEMORY
+from vinl.viewer.live import CONTACT_MEMORY, look_through
 from vinl.viewer.session import DepthImage, OpenEpisode, Request, Reset, Seek, Snapshot
 from vinl.viewer.world import World
 from vinl.world.boxes import Blocks
@@ -72,10 +72,7 @@ class Replay:
         k, qpos = self._frame, self._poses[self._frame]
         time = k * POSE_DT
         if look or not self._images:
-            self._images = {
-                name: DepthImage(camera.camera, camera.look(qpos[None])[0].numpy().copy())
-                for name, camera in self._cameras.items()
-            }
+            self._images = look_through(self._cameras, qpos[None])
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self._model, self._data)
         record, trace = self._episode.record, self._episode.trace
