@@ -66,13 +66,10 @@ class DepthCameras:
         self, chosen: Sequence[int], position: Float[np.ndarray, "k 3"], rotation: Float[np.ndarray, "k 3 3"]
     ) -> Float[torch.Tensor, "k height width"]:
         """Depth [m] that the cameras of the chosen robots see from given poses; overwritten by the next call."""
-        return self._prepare(len(chosen))(self._worlds[list(chosen)], position, rotation)
-
-    def _prepare(self, n: int) -> PreparedRender:
-        """The launch for so many robots, made when so many look for the first time."""
+        n = len(chosen)
         if n not in self._renders:
             self._renders[n] = PreparedRender(self._depth, n)
-        return self._renders[n]
+        return self._renders[n](self._worlds[list(chosen)], position, rotation)
 
     def place(self, qpos: Float[np.ndarray, "n 19"]) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3 3"]]:
         """Position and orientation of the cameras. Written out, not as matrix products: a library's product may round
@@ -95,18 +92,11 @@ def open_depth_cameras(
         camera: what each robot carries.
         ceiling: height of a ceiling [m]; none by default.
     """
-    meshes: list[Mesh] = []
-    worlds: list[int] = []
-    bare = -1
-    for some in blocks:
-        if not len(some) and bare >= 0:
-            worlds.append(bare)
-            continue
-        if not len(some):
-            bare = len(meshes)
-        worlds.append(len(meshes))
-        meshes.append(seen_mesh(plan, some, ceiling))
-    return DepthCameras(meshes, worlds, camera, floor=0.0)
+    first_bare = next((k for k, some in enumerate(blocks) if not len(some)), 0)
+    owners = [k if len(some) else first_bare for k, some in enumerate(blocks)]
+    kept = list(dict.fromkeys(owners))
+    meshes = [seen_mesh(plan, blocks[k], ceiling) for k in kept]
+    return DepthCameras(meshes, [kept.index(k) for k in owners], camera, floor=0.0)
 
 
 def seen_mesh(plan: FloorPlan, blocks: Blocks, ceiling: float | None = None) -> Mesh:

@@ -74,7 +74,8 @@ def settings_first(options: type[Any], argv: list[str]) -> list[str]:
         options: dataclass of the command; tells flags with a value from those without.
         argv: arguments after the command.
     """
-    switches = {"--" + field.name.replace("_", "-") for field in dataclasses.fields(options) if _is_switch(field)}
+    fields = dataclasses.fields(options)
+    switches = {"--" + field.name.replace("_", "-") for field in fields if field.type in (bool, "bool")}
     argv = [word for word in argv if word != "--set"]  # as it was written before
     settings: list[str] = []
     others: list[str] = []
@@ -93,10 +94,6 @@ def default_out(command: str, *names: str) -> Path:
         last = path.parent.name if path.name == "policy" and path.parent.name else path.name
         words.append(re.sub(r"[^\w.-]+", "_", last) or "run")
     return Path("runs") / "-".join((command, *words))
-
-
-def _is_switch(field: dataclasses.Field[Any]) -> bool:
-    return field.type in (bool, "bool")
 
 
 def _kind(annotation: Any) -> Any:

@@ -49,7 +49,9 @@ def main(argv: list[str]) -> int:
 
     source = options.config or "default"
     check_config(source, "navigation")
-    folder, config, num_envs = options.open_run(NavConfig, "navigation", _config_source(source), "nav-")
+    if not source.startswith("nav/") and not source.endswith((".yaml", ".yml")):  # bare names are those of configs/nav
+        source = f"nav/{source}"
+    folder, config, num_envs = options.open_run(NavConfig, "navigation", source, "nav-")
     if options.devices > 1 and "RANK" not in os.environ:
         return _start_processes(options.devices, argv)
     from vinl.nav.training import train_navigator
@@ -75,11 +77,6 @@ def main(argv: list[str]) -> int:
             else f"stopped and saved: go on with  vinl train-nav --resume {folder}"
         )
     return 0 if complete else INTERRUPTED
-
-
-def _config_source(name: str) -> str:
-    """Bare names are those of the shipped navigation configs."""
-    return name if name.startswith("nav/") or name.endswith((".yaml", ".yml")) else f"nav/{name}"
 
 
 def _choose_device(options: Options) -> str:

@@ -177,10 +177,7 @@ _FRACTIONS = (
 )
 """Columns in per cent."""
 
-_MEANS = (
-    ("foot_steps_per_crossing", "feet"),
-    ("leg_steps_per_crossing", "legs"),
-)
+_MEANS = (("foot_steps_per_crossing", "feet"), ("leg_steps_per_crossing", "legs"))
 """Columns in control steps on the bar per crossing."""
 
 

@@ -139,9 +139,7 @@ def record_steps(
 
             with contextlib.suppress(InterruptedRunError):
                 run_episodes(
-                    *(plan, some, locomotion, navigator, config),
-                    on_end=note_end,
-                    is_stopped=lambda: recorder.is_full,
+                    *(plan, some, locomotion, navigator, config), on_end=note_end, is_stopped=lambda: recorder.is_full
                 )
             if recorder.is_full:
                 return [sequence for sequence in recorder.done if len(sequence)]

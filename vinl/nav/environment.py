@@ -15,15 +15,7 @@ from torch import Tensor
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
 from vinl.nav.home_store import HomeStore
-from vinl.nav.kernels import (
-    Robots,
-    aim_cameras,
-    draw_keys,
-    move_robots,
-    place_robots,
-    render_interior,
-    write_rules,
-)
+from vinl.nav.kernels import Robots, aim_cameras, draw_keys, move_robots, place_robots, render_interior, write_rules
 from vinl.policies.places import blank_places, view_places, visit_places
 from vinl.robot.cameras import Camera
 from vinl.sensing.depth import check_device
@@ -120,11 +112,7 @@ class Measures:
         self._steps = torch.zeros(4, dtype=torch.float64, device=device)
 
     def add(
-        self,
-        end: EpisodeEnd,
-        reward: Float[Tensor, " n"],
-        blocked: Float[Tensor, " n"],
-        moved: Float[Tensor, " n"],
+        self, end: EpisodeEnd, reward: Float[Tensor, " n"], blocked: Float[Tensor, " n"], moved: Float[Tensor, " n"]
     ) -> None:
         """Count a step of all robots."""
         rows = torch.stack([end.counted.float(), *(getattr(end, name) for name in _NAMES[1:])])
@@ -382,9 +370,7 @@ class NavEnvironment:
         state = self.state
         self._chosen.copy_(chosen)
         self._launch(
-            place_robots,
-            self.num_envs,
-            [self.homes.homes, self._rules, "chance", "chosen", self._robots, "unplaced"],
+            place_robots, self.num_envs, [self.homes.homes, self._rules, "chance", "chosen", self._robots, "unplaced"]
         )
         self._draw_errors()
         if "places" in state:

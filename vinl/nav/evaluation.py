@@ -122,7 +122,11 @@ def evaluate_kind(
             end = environment.ended
             assert end is not None
             first = end.counted & ~over
-            figures = end if figures is None else EpisodeEnd(*map(_pick(first), end, figures))
+            figures = (
+                end
+                if figures is None
+                else EpisodeEnd(*(torch.where(first, now, then) for now, then in zip(end, figures, strict=True)))
+            )
             over |= end.counted
             paths.append(torch.where((over & ~first)[:, None], paths[-1], state["position"]))
             environment.restart(end.counted)
@@ -211,10 +215,6 @@ def _record(
         collisions=round(ended["collisions"]),
         left_m=round(ended["end_distance"], 3),
     )
-
-
-def _pick(chosen: torch.Tensor) -> Callable[[torch.Tensor, torch.Tensor], torch.Tensor]:
-    return lambda now, before: torch.where(chosen, now, before)
 
 
 MOTIONS = {

@@ -63,7 +63,8 @@ class HomeStore:
             raise InputError("no home can be used" + (f"; the last: {reasons[-1]}" if reasons else ""))
         self.device, self.reasons = check_device(device), list(reasons)
         self.records = [HomeRecord(h.seed, h.name, h.frame, h.floor, h.solid, h.blocks) for h in built]
-        self._meshes = [self._build_mesh(home, tree) for home in built]
+        with wp.ScopedStream(find_stream(self.device)):  # in order with torch's work, which reads the meshes
+            self._meshes = [build_mesh(home.vertices, home.faces, str(self.device), tree) for home in built]
         count, ends = len(built), np.cumsum([home.cells for home in built])
         cells, first = int(ends[-1]), np.concatenate([[0], ends[:-1]]).astype(np.int32)
         if cells * 4 >= 2**31:
@@ -197,10 +198,6 @@ class HomeStore:
     def save_state(self) -> dict[str, Any]:
         """Which homes are here, by their seeds."""
         return {"seeds": [record.seed for record in self.records], "names": [record.name for record in self.records]}
-
-    def _build_mesh(self, home: BuiltHome, tree: str | None) -> wp.Mesh:
-        with wp.ScopedStream(find_stream(self.device)):  # in order with torch's work, which reads the mesh
-            return build_mesh(home.vertices, home.faces, str(self.device), tree)
 
 
 def _count_workers(config: NavConfig, homes: int) -> int:

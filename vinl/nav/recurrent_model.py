@@ -97,11 +97,7 @@ class RecurrentActorCritic(nn.Module):
         nn.init.zeros_(value.bias)
 
     def forward(
-        self,
-        depth: Tensor | None,
-        vector: Float[Tensor, "t n k"],
-        state: State,
-        fresh: Bool[Tensor, "t n"],
+        self, depth: Tensor | None, vector: Float[Tensor, "t n k"], state: State, fresh: Bool[Tensor, "t n"]
     ) -> Outlook:
         """What is made of t steps; images in [0, 1] or as bytes."""
         actor = cast(MemoryActor, self.actor)

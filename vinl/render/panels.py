@@ -66,7 +66,8 @@ class MapPanel:
             (plan.walls.below(BODY_HEIGHT), _WALL),
             (blocks.boxes(), _BLOCK),
         ):
-            self._fill(boxes, colour)
+            for corners in self._at(boxes.corners()) if len(boxes) else []:
+                self._pen.polygon([tuple(p) for p in corners.tolist()], fill=colour)
         self._disc(np.array(record.start), 0.15, _START)
         self._disc(np.array(record.goal), radius, _GOAL)
         self._drawn, self._touched = 0, 0
@@ -92,10 +93,6 @@ class MapPanel:
 
     def _at(self, xy: np.ndarray) -> np.ndarray:
         return self._centre + (xy - self._middle) * [self._scale, -self._scale]
-
-    def _fill(self, boxes: Boxes, colour: tuple[int, int, int]) -> None:
-        for corners in self._at(boxes.corners()) if len(boxes) else []:
-            self._pen.polygon([tuple(p) for p in corners.tolist()], fill=colour)
 
     def _disc(self, xy: np.ndarray, radius: float, colour: tuple[int, int, int]) -> None:
         (x, y), r = self._at(xy), radius * self._scale

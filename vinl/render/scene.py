@@ -87,10 +87,7 @@ def plan_scene(
         furniture_height: furniture is cut here [m].
     """
     parts, colours = [], []
-    for boxes, height, palette in (
-        (plan.walls, wall_height, (WALL,)),
-        (plan.furniture, furniture_height, FURNITURE),
-    ):
+    for boxes, height, palette in ((plan.walls, wall_height, (WALL,)), (plan.furniture, furniture_height, FURNITURE)):
         cut = boxes.rows[boxes.rows[:, 5] < height - 0.02].copy()
         # Boxes that overlap must not share a plane: their colours would mix in a speckle.
         shift = 0.0007 * (np.arange(len(cut)) % 7)

@@ -382,8 +382,9 @@ def build_terrain(config: TerrainConfig) -> Terrain:
                     count = round(difficulty * 0.15 * TILE**2)
                     here = scatter_centres(rng, count, TILE / 2 - 0.3, 1.0, 1.2, none)
                     boxes = [draw_tall(rng, here[::2], long=True), draw_tall(rng, here[1::2], long=False)]
-                    # a wall is long: those that would reach into the start are left out
-                    tall += [Boxes(b.rows + shift) for b in map(_off_the_start, boxes)]
+                    # a wall is long: those nearer than 1.3 m to the middle, where robots start, are left out
+                    far = [b.rows[b.distances(_START)[:, 0] > 1.3] for b in boxes]
+                    tall += [Boxes(rows + shift) for rows in far]
                     blocks.append(_tile_blocks(config, rng, k, middle, here, config.wall_blocks))
                 case _:
                     here = scatter_centres(rng, round(config.tall_density * TILE**2) if k else 0, 3.7, 1.5, 1.5, none)
@@ -415,8 +416,3 @@ def _tile_blocks(
     centres = scatter_centres(rng, round(wanted), TILE / 2, clear, 0.45, taken)
     blocks = draw_blocks(rng, centres, config.heights_at(level), min(config.depth_at(level), 0.2))
     return Blocks(blocks.rows + np.array([*middle, 0, 0, 0, 0]))
-
-
-def _off_the_start(boxes: Boxes) -> Boxes:
-    """The boxes of a tile that a robot can start beside: they leave a disc of 1.3 m around its middle free."""
-    return Boxes(boxes.rows[boxes.distances(_START)[:, 0] > 1.3])

@@ -36,16 +36,8 @@ TABLE: dict[str, list[Wish]] = {
         (make.single_bed, 0.3, "corner"),
         (make.stand, 0.6, "floor"),
     ],
-    "dining": [
-        (make.dining_table, 1.0, "centre"),
-        (make.chest, 0.8, "wall"),
-        (make.shelf, 0.4, "wall"),
-    ],
-    "bath": [
-        (make.toilet, 0.95, "wall"),
-        (make.basin, 0.95, "wall"),
-        (make.washer, 0.4, "corner"),
-    ],
+    "dining": [(make.dining_table, 1.0, "centre"), (make.chest, 0.8, "wall"), (make.shelf, 0.4, "wall")],
+    "bath": [(make.toilet, 0.95, "wall"), (make.basin, 0.95, "wall"), (make.washer, 0.4, "corner")],
     "wc": [(make.toilet, 1.0, "middle"), (make.basin, 0.8, "wall")],
     "store": [
         (make.shelf, 0.9, "wall"),
@@ -60,11 +52,7 @@ TABLE: dict[str, list[Wish]] = {
         (make.armchair, 0.4, "corner"),
         (make.table_for_two, 0.2, "centre"),
     ],
-    "bureau": [
-        (make.shelf, 0.9, "wall"),
-        (make.shelf, 0.4, "wall"),
-        (make.table_for_two, 0.2, "centre"),
-    ],
+    "bureau": [(make.shelf, 0.9, "wall"), (make.shelf, 0.4, "wall"), (make.table_for_two, 0.2, "centre")],
     "meeting": [(make.dining_table, 1.0, "centre"), (make.chest, 0.6, "wall"), (make.shelf, 0.3, "wall")],
     "hall": [(make.shoe_rack, 0.7, "wall"), (make.shoe_rack, 0.3, "wall")],
     "living": [

@@ -188,7 +188,8 @@ def generate_home(seed: int, config: HomeConfig | None = None, resolution: float
             inside = paint_rects(rects, frame)
         furniture = Boxes(np.array([row for piece in pieces for row in piece.rows]).reshape(-1, 7))
         panes = Boxes(np.array(shell.panes).reshape(-1, 7))
-        labels = tuple(_label(room) for room in shell.rooms)
+        middles = [(room.kind, max(room.rects, key=measure)) for room in shell.rooms]
+        labels = tuple(RoomLabel(kind, (x0 + x1) / 2, (y0 + y1) / 2) for kind, (x0, y0, x1, y1) in middles)
         return assemble_floorplan(name, f"generated:{seed}", walls, furniture, inside, frame, panes, labels, roomy=True)
     raise InputError(IMPOSSIBLE)
 
@@ -207,11 +208,6 @@ def draw_shell(rng: Random, config: HomeConfig) -> Shell:
         if shell is not None:
             return shell
     raise InputError(IMPOSSIBLE)
-
-
-def _label(room: Room) -> RoomLabel:
-    x0, y0, x1, y1 = max(room.rects, key=measure)
-    return RoomLabel(room.kind, (x0 + x1) / 2, (y0 + y1) / 2)
 
 
 RESERVED_FROM = 1_000_000_000
@@ -238,10 +234,7 @@ class JudgingSet:
         return [generate_home(seed, config) for seed in range(self.first_seed, self.first_seed + self.count)]
 
 
-JUDGING_SETS = {
-    "offices": JudgingSet("office", 2_000_000_000),
-    "dead_ends": JudgingSet("dead_ends", 2_100_000_000),
-}
+JUDGING_SETS = {"offices": JudgingSet("office", 2_000_000_000), "dead_ends": JudgingSet("dead_ends", 2_100_000_000)}
 """20 office floors, and 20 homes whose rooms and doors make a tree."""
 
 
