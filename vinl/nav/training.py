@@ -120,7 +120,9 @@ def train_navigator(
     resume = config is None
     if config is None:
         config = build_config(NavConfig, run.open(), source=str(run.path / "config.yaml"))
-    check_minibatches(config)
+    robots, parts = config.num_envs, config.ppo.minibatches
+    if robots % parts:
+        raise InputError(f"num_envs must be a multiple of ppo.minibatches, got {robots} and {parts}")
     check_seeds(config, int(os.environ.get("WORLD_SIZE", "1")))
     peers, device = join_peers(device)
     origin = None
@@ -206,18 +208,6 @@ def describe_figures(row: dict[str, float]) -> dict[str, str]:
         if key in row:
             shown[key] = f"{row[key]:.{digits}f}"
     return {**shown, "rate": np.format_float_positional(row["learning_rate"], 2, fractional=False)}
-
-
-def check_minibatches(config: NavConfig) -> None:
-    """Robots must divide into minibatches.
-
-    Raises:
-        InputError: they do not.
-    """
-    if config.num_envs % config.ppo.minibatches:
-        raise InputError(
-            f"num_envs must be a multiple of ppo.minibatches, got {config.num_envs} and {config.ppo.minibatches}"
-        )
 
 
 def check_seeds(config: NavConfig, processes: int) -> None:
