@@ -29,15 +29,11 @@ from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.policies.velocity_range import VelocityRange
 from vinl.sensing.sensor_config import OdometryConfig, load_sensors
-from vinl.world.endings import END_REASONS as ALL_REASONS
-from vinl.world.endings import FALL, SUCCESS, name_late_end
+from vinl.world.endings import SUCCESS, name_late_end
 from vinl.world.free_space import FreeSpace
 from vinl.world.homes.generate import find_judging_set
 from vinl.world.readers import expand_paths, shipped_floorplans
 from vinl.world.start_goal import measure_route, shortest_distance
-
-END_REASONS = tuple(reason for reason in ALL_REASONS if reason != FALL)
-"""How an episode ends; nothing falls here."""
 
 _CHECK_EVERY = 25
 
