@@ -9,11 +9,10 @@ import pytest
 import torch
 
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.depth_cameras import open_depth_cameras
+from vinl.chain.depth_cameras import CameraErrors, open_depth_cameras
 from vinl.chain.episode import draw_routes, draw_setups
 from vinl.chain.navigators.learned import DeadReckoning
 from vinl.chain.navigators.oracle import OracleNavigator
-from vinl.chain.real_cameras import CameraErrors
 from vinl.chain.rollout import run_episodes
 from vinl.cli.app import main
 from vinl.policies.io import load_policy

@@ -23,7 +23,7 @@ from vinl.config.errors import InputError
 from vinl.courses.evaluate import TrialResults
 from vinl.courses.report import _COLUMNS, print_comparison
 from vinl.nav.training import describe_figures
-from vinl.render.film_file import write_film
+from vinl.render.panels import write_film
 from vinl.rl.loop import TrainingProgress
 from vinl.rl.machine import explain_out_of_memory
 from vinl.rl.run_folder import RunFolder

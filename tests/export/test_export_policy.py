@@ -10,10 +10,9 @@ import torch
 from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.export import policy
-from vinl.export.metadata import explain_rows
-from vinl.export.onnx_file import build_model, read_metadata
+from vinl.export.metadata import explain_rows, read_metadata
 from vinl.export.parity import LIMIT, ExportedPolicy
-from vinl.export.policy import Exported, ParityError, export_policy
+from vinl.export.policy import Exported, ParityError, build_model, export_policy
 from vinl.gait.observation import SENSED_TABLE
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.depth_actor import DepthActor

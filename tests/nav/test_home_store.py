@@ -10,7 +10,7 @@ from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.nav.config import ClutterConfig, EpisodeConfig, HomesConfig, NavConfig
 from vinl.nav.environment import NavEnvironment
-from vinl.nav.fields import measure_near_clearance, spread_fields
+from vinl.nav.fields import spread_fields
 from vinl.nav.home_builder import FIELD_RESOLUTION, build_home, prepare_home
 from vinl.nav.home_store import HomeStore
 from vinl.world.floorplan import measure_clearance
@@ -32,10 +32,7 @@ def test_homes_of_other_layouts_come_in_their_fractions():
 
 def test_fields_agree_with_those_of_the_world():
     plan = load_floorplan("old_town")
-    clearance = measure_near_clearance(plan.free, 0.05, 0.6)
-    exact = measure_clearance(plan.free, 0.05)
-    np.testing.assert_allclose(np.minimum(clearance, 0.6), np.minimum(exact, 0.6), atol=1e-3)
-    coarse = clearance[::2, ::2]
+    coarse = measure_clearance(plan.free, 0.05)[::2, ::2]
     mask = np.where(coarse >= 0.22, 2, np.where(coarse >= 0.12, 1, 0)).astype(np.uint8)
     goals = np.argwhere(mask == 2)[[5, 700]]
     fields = spread_fields(mask, goals, 0.1)

@@ -19,7 +19,6 @@ from vinl.config.loader import build_config
 from vinl.config.paths import assets_dir
 from vinl.nav.config import NavConfig
 from vinl.nav.evaluation import (
-    END_REASONS,
     NavEvaluation,
     NavRecord,
     build_homes,
@@ -126,7 +125,7 @@ def record(success: bool, spl: float, geodesic: float = 6.0) -> NavRecord:
 
 def test_classes_of_distance_and_what_is_drawn():
     records = [record(True, 0.9), record(False, 0.0, 12.0), *(record(True, 0.5 + k / 100) for k in range(20))]
-    classes = aggregate_by_distance(records, END_REASONS)
+    classes = aggregate_by_distance(records)
     assert [(c["from_m"], c["to_m"], c["episodes"]) for c in classes] == [(5.0, 7.5, 21), (10.0, 15.0, 1)]
     worst, middle = choose_drawn(records)
     assert worst[0] == 1 and len(worst) == 6 and len(middle) == 3 and not set(worst) & set(middle)
@@ -134,13 +133,13 @@ def test_classes_of_distance_and_what_is_drawn():
 
 def test_failures_are_counted_by_kind_and_named_by_home(capsys):
     records = [record(True, 0.9), record(False, 0.0), record(False, 0.0), replace(record(False, 0.0), plan="q")]
-    counted = count_failures(records, END_REASONS)
+    counted = count_failures(records)
     assert counted["lost"] == counted["reasons"]["stuck"] == 3 and counted["reasons"]["looping"] == 0
     assert list(counted["homes"].items()) == [("p", 2), ("q", 1)] and "success" not in counted["reasons"]
-    print_failures(Console(width=100), {"offices": counted, "fine": count_failures(records[:1], END_REASONS)})
+    print_failures(Console(width=100), {"offices": counted, "fine": count_failures(records[:1])})
     shown = capsys.readouterr().out
     assert "offices" in shown and "p: 2, q: 1" in shown
-    print_failures(Console(), {"fine": count_failures(records[:1], END_REASONS)})
+    print_failures(Console(), {"fine": count_failures(records[:1])})
     assert capsys.readouterr().out == ""
 
 

@@ -1,5 +1,4 @@
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +7,7 @@ from vinl.render.raytrace import ChaseCamera, RayRenderer, look_at
 from vinl.render.scene import BLOCK, GOAL, RobotShape, plain_scene, plan_scene
 from vinl.robot.aliengo import home_qpos
 from vinl.world.boxes import Blocks, Boxes
+from vinl.world.floorplan import FloorPlan
 from vinl.world.grid import GridFrame
 
 FRAME = GridFrame(-10.0, -10.0, 1.0, (21, 21))
@@ -78,7 +78,8 @@ def test_shape_places_the_bodies(shape):
 def test_homes_are_cut_low_and_keep_their_colours():
     walls = Boxes(np.array([[0, 2, 0, 4, 0.1, 0, 2.5]]))
     furniture = Boxes(np.array([[1, 0, 0, 0.5, 0.5, 0, 1.8], [0, 0, 0, 1, 1, 1.5, 2.0]]))
-    plan = SimpleNamespace(walls=walls, furniture=furniture, frame=FRAME)
+    inside = np.ones(FRAME.shape, bool)
+    plan = FloorPlan("room", "room", walls, furniture, inside, inside, FRAME)
     scene = plan_scene(plan, Blocks(np.array([[1, 1, 0, 0.3, 0.2, 0.15]])), goal=(2.0, 1.0))
     assert scene.vertices[:, 2].max() <= 1.0
     # A wall, one piece of furniture (the other hangs above the cut), a block, the goal (and one hidden face).

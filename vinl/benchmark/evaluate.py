@@ -69,10 +69,7 @@ class Store:
     ) -> None:
         self._protocol, self._folder = protocol, folder
         self._config = protocol.describe(row)
-        self._policies = {
-            "locomotion": describe_policy(row.locomotor),
-            "navigation": describe_navigator(row.navigator),
-        }
+        self._policies = {"locomotion": describe_policy(row.locomotor), "navigation": describe_navigator(row.navigator)}
         self.journal: Journal | None = None
         self.done: dict[Key, Episode] = {}
         if keep and folder is not None:

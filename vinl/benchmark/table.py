@@ -109,19 +109,14 @@ class TableConfig:
             if name not in self.rows:
                 raise InputError(f"--rows: there is no row {name!r}{closest(name, self.rows)}; {', '.join(self.rows)}")
         chosen: dict[str, RowConfig] = {}
+        seen: list[RowConfig] = []
         for name, row in self.rows.items():
-            if names and name not in names:
-                continue
-            changed = (
-                row
-                if nav is None or row.nav == ORACLE
-                else replace(row, nav=nav, recovery=row.recovery and nav != ORACLE)
-            )
-            same = [
-                r for r in chosen.values() if replace(r, title="", paper=None) == replace(changed, title="", paper=None)
-            ]
-            if not same:
-                chosen[name] = changed
+            if nav is not None and row.nav != ORACLE:
+                row = replace(row, nav=nav, recovery=row.recovery and nav != ORACLE)
+            who = replace(row, title="", paper=None)
+            if (not names or name in names) and who not in seen:
+                chosen[name] = row
+                seen.append(who)
         return TableConfig(self.reference if self.reference in chosen else next(iter(chosen)), chosen)
 
 

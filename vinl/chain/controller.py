@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
+from vinl.chain.depth_cameras import CameraErrors, DepthCameras, RealCameras, open_depth_cameras
 from vinl.chain.ground_reader import GaitReader, ScanReader, map_plan
-from vinl.chain.real_cameras import CameraErrors, RealCameras
 from vinl.config.errors import InputError
 from vinl.gait.observation import SENSED_TABLE, insert_gait
 from vinl.policies.card import PolicyCard, find_detour, find_gait, reads_ground

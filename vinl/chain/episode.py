@@ -5,7 +5,7 @@ Every random draw follows from (seed, plan name, episode), on every machine alik
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Float
@@ -92,6 +92,8 @@ PATH_EVERY, FILM_EVERY = 5, 2
 
 _FOOT, _LEG, _TRUNK = (0, 1), (2, 3), (4, 5)
 
+_COUNTED = tuple(f.name for f in fields(EpisodeRecord) if f.name.endswith("_steps"))
+
 
 class Recorder:
     """Counts one episode, step by step."""
@@ -103,7 +105,7 @@ class Recorder:
         self._contacts: list[tuple[float, int, float, float]] = []
         self._poses: list[np.ndarray] = []
         self._commands: list[np.ndarray] = []
-        self._counts = dict.fromkeys(("foot", "foot_block", "foot_wall", "leg", "trunk", "paper"), 0)
+        self._counts = dict.fromkeys(_COUNTED, 0)
         self._errors = np.zeros(2)
         self._steps, self._distance, self._end = 0, 0.0, ""
 
@@ -123,13 +125,13 @@ class Recorder:
         if steps % PATH_EVERY == 0:
             self._path.append(self._at.copy())
         touches, counts = robot.contacts.touches, self._counts
-        counts["paper"] += robot.contacts.breaks_paper_rule()
+        counts["paper_foot_steps"] += robot.contacts.breaks_paper_rule()
         if touches:
-            counts["foot"] += any(kind in touches for kind in _FOOT)
-            counts["foot_block"] += _FOOT[0] in touches
-            counts["foot_wall"] += _FOOT[1] in touches
-            counts["leg"] += any(kind in touches for kind in _LEG)
-            counts["trunk"] += any(kind in touches for kind in _TRUNK)
+            counts["foot_steps"] += any(kind in touches for kind in _FOOT)
+            counts["foot_block_steps"] += _FOOT[0] in touches
+            counts["foot_wall_steps"] += _FOOT[1] in touches
+            counts["leg_contact_steps"] += any(kind in touches for kind in _LEG)
+            counts["trunk_contact_steps"] += any(kind in touches for kind in _TRUNK)
             time = steps * CONTROL_DT
             self._contacts += [(time, touch.kind, touch.x, touch.y) for touch in touches.values()]
 
@@ -147,7 +149,7 @@ class Recorder:
 
     def close(self) -> Episode:
         """Record and trace of the episode."""
-        setup, route, counts = self._setup, self._setup.route, self._counts
+        setup, route = self._setup, self._setup.route
         success, rmse = self._end == SUCCESS, np.sqrt(self._errors / max(self._steps, 1))
         left = 0.0 if success else self._left()
         contacts = np.array(self._contacts, np.float64).reshape(-1, 4)
@@ -168,12 +170,7 @@ class Recorder:
             distance_m=self._distance,
             spl=spl(success, route.geodesic_m, self._distance),
             soft_spl=soft_spl(route.geodesic_m, left, self._distance),
-            foot_steps=counts["foot"],
-            foot_block_steps=counts["foot_block"],
-            foot_wall_steps=counts["foot_wall"],
-            leg_contact_steps=counts["leg"],
-            trunk_contact_steps=counts["trunk"],
-            paper_foot_steps=counts["paper"],
+            **self._counts,
             speed_rmse=float(rmse[0]),
             yaw_rate_rmse=float(rmse[1]),
             end_at=self._find_cause(contacts),

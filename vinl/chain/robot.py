@@ -13,9 +13,11 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.chain.config import FaultConfig
-from vinl.chain.scene import BLOCKS, FORCE_SENSORS, TOUCH_SENSORS, WALLS
+from vinl.chain.scene import BLOCKS, FORCE_SENSORS, TOUCH_SENSORS, WALLS, build_scene
+from vinl.policies.card import PolicyCard
 from vinl.robot.aliengo import CONTROL_DT, FOOT_GEOMS, STANDING_HEIGHT, SUBSTEPS, home_qpos
 from vinl.robot.rotation import matrix_of
+from vinl.world.boxes import Boxes
 
 KINDS = ("foot_block", "foot_wall", "leg_block", "leg_wall", "trunk_block", "trunk_wall")
 """What may touch what. A leg is hip, thigh and shank; furniture counts as wall."""
@@ -189,6 +191,14 @@ BIAS_TIME = 1.0
 ANGULAR_NOISE, TILT_NOISE = 0.2, 0.05
 """Half-widths of the uniform noise that ``imu_noise`` multiplies: of the angular velocity [rad/s] and of the direction
 of gravity [rad], as in legged_gym's training [ViNL config]."""
+
+
+def build_model(walls: Boxes, blocks: Boxes, card: PolicyCard, faults: FaultConfig) -> mujoco.MjModel:
+    """A robot's world, with the gains of the card of a locomotion policy, and with faults of motors and body."""
+    kp, kd = (float(card.action[key]) for key in ("kp", "kd"))
+    model = build_scene(walls, blocks, kp=kp * faults.kp_scale, kd=kd * faults.kd_scale)
+    change_body(model, faults)
+    return model
 
 
 def change_body(model: mujoco.MjModel, faults: FaultConfig) -> None:

@@ -9,15 +9,13 @@ import numpy as np
 from vinl.chain.batching import ask_only, batch_navigator, batch_policy
 from vinl.chain.config import EvaluationConfig, FaultConfig
 from vinl.chain.controller import open_controller
-from vinl.chain.depth_cameras import open_depth_cameras
+from vinl.chain.depth_cameras import CameraErrors, open_depth_cameras
 from vinl.chain.episode import EpisodeSetup, Recorder, draw_faults, sensor_key
 from vinl.chain.metrics import tracking_errors
 from vinl.chain.navigators.base import Navigator, Task, decide
 from vinl.chain.navigators.learned import DeadReckoning
-from vinl.chain.real_cameras import CameraErrors
 from vinl.chain.records import Episode
-from vinl.chain.robot import FaultyState, Robot, Robots, change_body
-from vinl.chain.scene import build_scene
+from vinl.chain.robot import FaultyState, Robot, Robots, build_model
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.rotation import yaw_of
@@ -122,17 +120,13 @@ def run_episodes(
 def _spawn_robots(
     plan: FloorPlan, setups: Sequence[EpisodeSetup], locomotor: Policy, faults: FaultConfig
 ) -> list[Robot]:
-    kp, kd = (float(locomotor.card.action[key]) for key in ("kp", "kd"))
-    kp, kd = kp * faults.kp_scale, kd * faults.kd_scale
-    robots, bare = [], None
+    robots, bare = [], None  # those without blocks share a model
     for setup in setups:
-        model = bare
-        if model is None or len(setup.blocks):
-            model = build_scene(plan.boxes, setup.blocks.boxes(), kp=kp, kd=kd)
-            change_body(model, faults)
-        if not len(setup.blocks):
-            bare = model
-        robot = Robot(model, faults.delay_steps)
-        robot.spawn(float(setup.route.start[0]), float(setup.route.start[1]), setup.yaw, setup.joints)
-        robots.append(robot)
+        cluttered = len(setup.blocks) > 0
+        model = None if cluttered else bare
+        if model is None:
+            model = build_model(plan.boxes, setup.blocks.boxes(), locomotor.card, faults)
+        bare = bare if cluttered else model
+        robots.append(Robot(model, faults.delay_steps))
+        robots[-1].spawn(float(setup.route.start[0]), float(setup.route.start[1]), setup.yaw, setup.joints)
     return robots

@@ -220,7 +220,7 @@ def check_policy() -> str:
 
 def check_video() -> str:
     """An MP4 can be written."""
-    from vinl.render.film_file import write_film
+    from vinl.render.panels import write_film
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trial.mp4"

@@ -101,17 +101,11 @@ def _run_courses(options: Options, names: list[str], out: Path, command: list[st
 
     from vinl.cli.progress import Progress
     from vinl.config.output import write_json
-    from vinl.courses.courses import choose_commands
-    from vinl.courses.evaluate import check_locomotor_numbers, choose_density, compare_locomotors
-    from vinl.courses.grounds import GroundConfig
+    from vinl.courses.evaluate import compare_locomotors
     from vinl.courses.report import draw_contacts, label_policies, print_comparison, print_figures, results_as_dict
 
     robots, seconds = _chosen(options, "robots"), _chosen(options, "seconds")
-    workers, density = _count_workers(options), choose_density(options.density, options.terrain)
-    check_locomotor_numbers(robots, seconds, options.seed, workers)
-    choose_commands(options.commands, options.terrain)
-    GroundConfig(options.terrain, density, options.level, options.seed, 1.0, 1.0)  # refuses what it cannot draw
-    policies, console = _load(names, options), Console()
+    policies, console, workers = _load(names, options), Console(), _count_workers(options)
     with Progress(console) as progress:
         results = compare_locomotors(
             policies,
@@ -119,7 +113,7 @@ def _run_courses(options: Options, names: list[str], out: Path, command: list[st
             robots,
             seconds,
             options.seed,
-            density,
+            options.density,
             options.level,
             options.commands,
             workers,
@@ -127,7 +121,7 @@ def _run_courses(options: Options, names: list[str], out: Path, command: list[st
         )
     compared = dict(zip(label_policies(names), results, strict=True))
     write_json(out / "results.json", results_as_dict(compared, command, workers))
-    if options.terrain == "blocks" and density > 0:
+    if options.terrain == "blocks" and results[0].config["ground"]["density"] > 0:
         draw_contacts(compared, out / "contacts.png")
     if options.compare:
         print_comparison(console, compared)
@@ -142,16 +136,11 @@ def _run_bars(options: Options, names: list[str], out: Path, command: list[str])
 
     from vinl.cli.progress import Progress
     from vinl.config.output import write_json
-    from vinl.courses.crossing import BarConfig
-    from vinl.courses.evaluate_crossings import check_crossing_numbers, compare_crossings
+    from vinl.courses.evaluate_crossings import compare_crossings
     from vinl.courses.report import label_policies, picture_crossings, print_crossings, results_as_dict
 
     heights, depth, speed, crossings = (_chosen(options, name) for name in _BARS)
-    workers = _count_workers(options)
-    check_crossing_numbers(heights, crossings, options.seed, workers)
-    for height in heights:
-        BarConfig(height, depth, speed, options.seed, 1.0, 1.0)  # refuses what makes no sense
-    policies, console = _load(names, options), Console()
+    policies, console, workers = _load(names, options), Console(), _count_workers(options)
     with Progress(console) as progress:
         results = compare_crossings(
             policies, heights, depth, speed, crossings, options.seed, options.video, workers, progress.show

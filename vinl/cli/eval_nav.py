@@ -61,8 +61,8 @@ def main(argv: list[str]) -> int:
     from rich.console import Console
 
     from vinl.config.output import SCHEMA, check_out, describe_environment, strip_command, write_json, write_text
+    from vinl.nav.environment import STUCK_STEPS
     from vinl.nav.evaluation import (
-        END_REASONS,
         NavEvaluation,
         build_homes,
         describe_episodes,
@@ -70,7 +70,6 @@ def main(argv: list[str]) -> int:
         evaluate_kind,
         load_navigator,
     )
-    from vinl.nav.measures import STUCK_STEPS
     from vinl.nav.report import (
         aggregate_by_distance,
         aggregate_navigation,
@@ -134,20 +133,20 @@ def main(argv: list[str]) -> int:
         },
         "policies": {"navigation": describe_policy(policy)},
         "environment": describe_environment(),
-        "aggregate": aggregate_navigation(records, END_REASONS),
+        "aggregate": aggregate_navigation(records),
         "kinds": {
             kind.kind: {
-                "aggregate": aggregate_navigation(kind.records, END_REASONS),
-                "distances": aggregate_by_distance(kind.records, END_REASONS),
+                "aggregate": aggregate_navigation(kind.records),
+                "distances": aggregate_by_distance(kind.records),
                 "homes": len(kind.homes),
                 "dropped": kind.dropped,
                 "reasons": kind.reasons[:20],
                 "left_out": kind.left_out,
-                "failures": count_failures(kind.records, END_REASONS),
+                "failures": count_failures(kind.records),
             }
             for kind in results
         },
-        "distances": aggregate_by_distance(records, END_REASONS),
+        "distances": aggregate_by_distance(records),
         "episodes": [asdict(record) for record in records],
         "timing": {"wall_seconds": round(time.monotonic() - begun, 2)},
     }

@@ -81,7 +81,8 @@ def settings_first(options: type[Any], argv: list[str]) -> list[str]:
         options: dataclass of the command; tells flags with a value from those without.
         argv: arguments after the command.
     """
-    switches = {"--" + field.name.replace("_", "-") for field in dataclasses.fields(options) if _is_switch(field)}
+    fields = dataclasses.fields(options)
+    switches = {"--" + field.name.replace("_", "-") for field in fields if field.type in (bool, "bool")}
     argv = [word for word in argv if word != "--set"]  # as it was written before
     settings: list[str] = []
     others: list[str] = []
@@ -100,10 +101,6 @@ def default_out(command: str, *names: str) -> Path:
         last = path.parent.name if path.name == "policy" and path.parent.name else path.name
         words.append(re.sub(r"[^\w.-]+", "_", last) or "run")
     return Path("runs") / "-".join((command, *words))
-
-
-def _is_switch(field: dataclasses.Field[Any]) -> bool:
-    return field.type in (bool, "bool")
 
 
 def _kind(annotation: Any) -> Any:
@@ -240,28 +237,18 @@ def check_run(folder: str, kind: str, iterations: int | None) -> None:
     Raises:
         InputError: it is one, or no run.
     """
-    from vinl.rl.run_folder import RunFolder
+    from vinl.rl.run_folder import METRICS, RunFolder
 
     run = RunFolder(folder)
     found = "navigation" if "homes" in run.open() else "locomotion"
     if found != kind:
         raise InputError(f"{folder} is a {found} run: use {COMMANDS[found]} --resume {folder}")
-    done = count_iterations(run.path)
+    done, curves = 0, run.path / METRICS
+    for line in reversed(curves.read_text(encoding="utf-8").splitlines() if curves.is_file() else []):
+        with contextlib.suppress(ValueError, KeyError, TypeError):  # a line that a kill cut off
+            done = int(json.loads(line)["iteration"])
+            break
     if iterations is not None and done >= iterations:
         raise InputError(
             f"{folder} already has {done} iteration{'s' if done != 1 else ''}; give more with --iterations"
         )
-
-
-def count_iterations(folder: Path) -> int:
-    """Of a run, by its curves; 0 without any."""
-    from vinl.rl.run_folder import METRICS
-
-    file = folder / METRICS
-    lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
-    for line in reversed(lines):
-        try:
-            return int(json.loads(line)["iteration"])
-        except (ValueError, KeyError, TypeError):  # a line that a kill cut off
-            continue
-    return 0

@@ -44,29 +44,16 @@ def main(argv: list[str]) -> int:
     from vinl.rl.machine import use_compile_cache
 
     use_compile_cache()
-    from vinl.cli.options import check_config, check_run, check_source
-    from vinl.config.output import check_out
     from vinl.loco.config import LocoConfig
     from vinl.rl.machine import explain_out_of_memory
     from vinl.rl.nan_guard import NotFiniteError
-    from vinl.rl.run_folder import RunFolder
 
-    if options.resume:
-        folder, config = options.resume, None
-        check_run(folder, "locomotion", options.iterations)
-        num_envs = int(RunFolder(folder).open().get("num_envs", 0))
-    else:
-        source = options.config or STAGES[options.stage]
-        check_config(source, "locomotion")
-        config = options.read_config(LocoConfig, source)
-        num_envs = config.num_envs
-        if options.from_policy is not None:
-            check_source(options.from_policy, "locomotion")
-            config = replace(config, from_policy=options.from_policy)
+    source = options.config or STAGES[options.stage]
+    folder, config, num_envs = options.open_run(LocoConfig, "locomotion", source)
+    if config is not None:
         if options.stage not in (1, config.stage):
             raise InputError(f"--stage {options.stage}: {source} is a config of stage {config.stage}")
-        folder = options.out or f"runs/{source.removesuffix('.yaml').split('/')[-1]}"
-    check_out(folder)
+        config = replace(config, from_policy=options.from_policy or config.from_policy)
     from rich.console import Console
 
     with Console(stderr=True).status("loading JAX and the simulator"):  # some seconds; says nothing where it is piped

@@ -43,25 +43,15 @@ def main(argv: list[str]) -> int:
         raise InputError(f"--memory must be positive, got {options.memory}")
     device = _choose_device(options)
 
-    from vinl.cli.options import check_config, check_run, check_source
-    from vinl.config.output import check_out
+    from vinl.cli.options import check_config
     from vinl.nav.config import NavConfig
     from vinl.rl.machine import explain_out_of_memory
-    from vinl.rl.run_folder import RunFolder
 
-    if options.resume:
-        folder, config = options.resume, None
-        check_run(folder, "navigation", options.iterations)
-        num_envs = int(RunFolder(folder).open().get("num_envs", 0))
-    else:
-        source = options.config or "default"
-        check_config(source, "navigation")
-        if options.from_policy is not None:
-            check_source(options.from_policy, "navigation")
-        config = options.read_config(NavConfig, _config_source(source))
-        num_envs = config.num_envs
-        folder = options.out or f"runs/nav-{source.removesuffix('.yaml').split('/')[-1]}"
-    check_out(folder)
+    source = options.config or "default"
+    check_config(source, "navigation")
+    if not source.startswith("nav/") and not source.endswith((".yaml", ".yml")):  # bare names are those of configs/nav
+        source = f"nav/{source}"
+    folder, config, num_envs = options.open_run(NavConfig, "navigation", source, "nav-")
     if options.devices > 1 and "RANK" not in os.environ:
         return _start_processes(options.devices, argv)
     from vinl.nav.training import train_navigator
@@ -87,11 +77,6 @@ def main(argv: list[str]) -> int:
             else f"stopped and saved: go on with  vinl train-nav --resume {folder}"
         )
     return 0 if complete else INTERRUPTED
-
-
-def _config_source(name: str) -> str:
-    """Bare names are those of the shipped navigation configs."""
-    return name if name.startswith("nav/") or name.endswith((".yaml", ".yml")) else f"nav/{name}"
 
 
 def _choose_device(options: Options) -> str:

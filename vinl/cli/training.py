@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import tyro
 
-from vinl.cli.options import Settings
+from vinl.cli.options import Settings, check_config, check_run, check_source
 from vinl.config.errors import InputError
 from vinl.config.limits import check_fields
 
@@ -70,12 +70,38 @@ class TrainingOptions:
                 "--resume goes on with the run's own config; only --iterations, --minutes and --device may be given"
             )
 
-    def read_config(self, kind: type[AnyConfig], source: str) -> AnyConfig:
-        """The config of a new run."""
-        from vinl.config.loader import load_config
+    def open_run(
+        self, kind: type[AnyConfig], policy: str, source: str, prefix: str = ""
+    ) -> tuple[str, AnyConfig | None, int]:
+        """The run's folder, its config (None: it goes on with its own), and how many robots it has on each device.
 
-        short = {"num_envs": self.num_envs, "iterations": self.iterations, "seed": self.seed}
-        return load_config(kind, source, [*self.overrides, *(f"{k}={v}" for k, v in short.items() if v is not None)])
+        Args:
+            kind: of the config.
+            policy: kind of policy that is trained.
+            source: of the config of a new run.
+            prefix: before the config's name in the folder's, if none is given.
+
+        Raises:
+            InputError: config, run or policy to start from are of another kind, or the folder cannot be written to.
+        """
+        from vinl.config.loader import load_config
+        from vinl.config.output import check_out
+        from vinl.rl.run_folder import RunFolder
+
+        if self.resume:
+            check_run(self.resume, policy, self.iterations)
+            folder, config, robots = self.resume, None, int(RunFolder(self.resume).open().get("num_envs", 0))
+        else:
+            check_config(source, policy)
+            if self.from_policy is not None:
+                check_source(self.from_policy, policy)
+            short = {"num_envs": self.num_envs, "iterations": self.iterations, "seed": self.seed}
+            given = [f"{name}={value}" for name, value in short.items() if value is not None]
+            config = load_config(kind, source, [*self.overrides, *given])
+            name = source.removesuffix(".yaml").split("/")[-1]
+            folder, robots = self.out or f"runs/{prefix}{name}", config.num_envs
+        check_out(folder)
+        return folder, config, robots
 
     def start_logger(self, folder: str) -> None:
         """Begin what the logger needs. TensorBoard's files in the run's folder are always written; Weights & Biases

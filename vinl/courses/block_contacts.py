@@ -58,54 +58,6 @@ class BlockContacts(NamedTuple):
         return int(self.feet[row].any()), int(self.legs[row].any()), int(self.trunk[row])
 
 
-class BlockContactReader(ContactReader):
-    """Also notes which feet and legs touch blocks, and blocks of what height.
-
-    Args:
-        model: the world.
-        data: of one robot in it.
-        out: where to note it.
-        row: the robot's row there.
-    """
-
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, out: BlockContacts, row: int) -> None:
-        self._out, self._row = out, row
-        names = [model.body(k).name for k in range(model.nbody)]
-        is_leg = np.array([name.endswith(("_hip", "_thigh", "_calf")) for name in names])[model.geom_bodyid]
-        number = np.array([LEGS.index(name[:2]) if name[:2] in LEGS else 0 for name in names])
-        limb, leg, height = np.where(is_leg, 1, -1), number[model.geom_bodyid], np.full(model.ngeom, -1)
-        limb[[model.geom(name).id for name in FOOT_GEOMS]] = 0
-        blocks = model.geom_bodyid == model.body(BLOCKS).id
-        height[blocks] = bin_heights(2 * model.geom_size[blocks, 2])
-        self._limb, self._leg, self._height = limb, leg, height
-        super().__init__(model, data)
-
-    def clear(self) -> None:
-        """Forget the touches: a new control step begins."""
-        super().clear()
-        for flags in self._out:
-            flags[self._row] = False
-
-    def look(self) -> None:
-        """Latch what the last physics step touched."""
-        super().look()
-        if _WALL_KINDS & self.touches.keys():
-            self._out.walls[self._row] = True
-        if not self._touch[0]:
-            return
-        self._out.trunk[self._row] |= _TRUNK_ON_BLOCK in self.touches
-        geoms = self._data.contact.geom
-        limb, height = self._limb[geoms].max(1), self._height[geoms].max(1)
-        for k in np.flatnonzero((limb >= 0) & (height >= 0)):
-            a, b = geoms[k]
-            leg = self._leg[a if self._limb[a] >= 0 else b]
-            by_leg, by_bin = (
-                (self._out.feet, self._out.foot_bins) if limb[k] == 0 else (self._out.legs, self._out.leg_bins)
-            )
-            by_leg[self._row, leg] = True
-            by_bin[self._row, height[k]] = True
-
-
 class Strain(NamedTuple):
     """What one control step took, robot by robot, over all its physics steps.
 
@@ -129,51 +81,75 @@ class Strain(NamedTuple):
         return cls(np.zeros(n), np.zeros(n), np.zeros(n, bool), np.zeros(n, bool), np.zeros((n, 4), bool))
 
 
-class StrainReader(BlockContactReader):
-    """Also notes torques, joint speeds, forces on the feet and where the robot touches itself.
+class StrainReader(ContactReader):
+    """Also notes which feet and legs touch blocks of what height, torques, joint speeds, forces on the feet, and where
+    the robot touches itself.
 
     Args:
         model: the world.
         data: of one robot in it.
         touches: where to note touches of blocks.
         strain: where to note the rest.
-        row: the robot's row there.
+        row: the robot's row in both.
     """
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, touches: BlockContacts, strain: Strain, row: int
     ) -> None:
-        bodies = [model.body(k).name.split("_")[0] for k in range(model.nbody)]
-        self._leg_of = np.array([LEGS.index(name) if name in LEGS else -1 for name in bodies])[model.geom_bodyid]
-        self._strain, self._at, self._substep = strain, row, 0
+        self._out, self._strain, self._row, self._substep = touches, strain, row, 0
+        names = [model.body(k).name for k in range(model.nbody)]
+        is_leg = np.array([name.endswith(("_hip", "_thigh", "_calf")) for name in names])[model.geom_bodyid]
+        number = np.array([LEGS.index(name[:2]) if name[:2] in LEGS else -1 for name in names])
+        limb, height = np.where(is_leg, 1, -1), np.full(model.ngeom, -1)
+        limb[[model.geom(name).id for name in FOOT_GEOMS]] = 0
+        blocks = model.geom_bodyid == model.body(BLOCKS).id
+        height[blocks] = bin_heights(2 * model.geom_size[blocks, 2])
+        self._limb, self._leg, self._height = limb, number[model.geom_bodyid], height
         self._torque, self._speed = data.actuator_force, data.qvel[6:]
         first = int(model.sensor(FORCE_SENSORS[0]).adr[0])
         self._load = data.sensordata[first : first + 12]
         self._self = data.sensordata[int(model.sensor(TOUCH_SENSORS[3]).adr[0]) :][:1]
         self._torques, self._speeds, self._loads = (np.zeros((SUBSTEPS, 12)) for _ in range(3))
-        super().__init__(model, data, touches, row)
+        super().__init__(model, data)
 
     def clear(self) -> None:
-        """A new control step begins."""
+        """Forget the touches: a new control step begins."""
         super().clear()
         self._substep = 0
-        self._strain.leg_leg[self._at] = self._strain.own_body[self._at] = False
+        for flags in (*self._out, self._strain.leg_leg, self._strain.own_body):
+            flags[self._row] = False
 
     def look(self) -> None:
-        """Note what the last physics step took."""
+        """Latch what the last physics step touched, and what it took."""
         super().look()
         k = self._substep
         self._torques[k], self._speeds[k], self._loads[k] = self._torque, self._speed, self._load
         self._substep = k + 1
         if self._self[0]:
-            self._strain.own_body[self._at] = True
-            a, b = self._data.contact.geom.T
-            legs = self._leg_of[a], self._leg_of[b]
-            self._strain.leg_leg[self._at] |= bool(((legs[0] != legs[1]) & (legs[0] >= 0) & (legs[1] >= 0)).any())
+            self._strain.own_body[self._row] = True
+            one, other = self._leg[self._data.contact.geom.T]
+            self._strain.leg_leg[self._row] |= bool(((one != other) & (one >= 0) & (other >= 0)).any())
+        if _WALL_KINDS & self.touches.keys():
+            self._out.walls[self._row] = True
+        if self._touch[0]:
+            self._look_at_blocks()
+
+    def _look_at_blocks(self) -> None:
+        self._out.trunk[self._row] |= _TRUNK_ON_BLOCK in self.touches
+        geoms = self._data.contact.geom
+        limb, height = self._limb[geoms].max(1), self._height[geoms].max(1)
+        for k in np.flatnonzero((limb >= 0) & (height >= 0)):
+            a, b = geoms[k]
+            leg = self._leg[a if self._limb[a] >= 0 else b]
+            by_leg, by_bin = (
+                (self._out.feet, self._out.foot_bins) if limb[k] == 0 else (self._out.legs, self._out.leg_bins)
+            )
+            by_leg[self._row, leg] = True
+            by_bin[self._row, height[k]] = True
 
     def sum_up(self) -> None:
         """The control step has ended."""
-        strain, k, taken = self._strain, self._at, slice(self._substep)
+        strain, k, taken = self._strain, self._row, slice(self._substep)
         strain.work[k] = np.abs(self._torques[taken] * self._speeds[taken]).sum() * PHYSICS_DT
         strain.speed[k] = (np.abs(self._speeds[taken]) / JOINT_SPEED_LIMIT).max()
         strain.stance[k] = self._loads[taken].reshape(-1, 4, 3).any((0, 2))

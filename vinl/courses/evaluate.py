@@ -127,8 +127,12 @@ def compare_locomotors(
     Raises:
         InputError: a number is out of range or a name unknown.
     """
-    check_locomotor_numbers(robots, seconds, seed, workers)
-    chosen, density = choose_commands(commands, terrain), choose_density(density, terrain)
+    check_number("--robots", robots, 1, 100_000)
+    check_number("--seconds", seconds, CONTROL_DT, 36_000)
+    check_number("--seed", seed, 0, 2**31 - 1)
+    check_number("--workers", workers, 1, 1024)
+    chosen = choose_commands(commands, terrain)
+    density = DENSITY.get(terrain, 1.0) if density is None else density
     for policy in policies:
         check_locomotion_policy(policy)
     grounds = [
@@ -152,23 +156,6 @@ def compare_locomotors(
         figures = aggregate_robots(records, height_fractions(ground), ground.covered())
         results.append(TrialResults(records, figures, {"locomotion": describe_policy(policy)}, config, wall))
     return results
-
-
-def check_locomotor_numbers(robots: int, seconds: float, seed: int, workers: int) -> None:
-    """Refuse numbers that make no sense.
-
-    Raises:
-        InputError: one of them is out of range.
-    """
-    check_number("--robots", robots, 1, 100_000)
-    check_number("--seconds", seconds, CONTROL_DT, 36_000)
-    check_number("--seed", seed, 0, 2**31 - 1)
-    check_number("--workers", workers, 1, 1024)
-
-
-def choose_density(density: float | None, terrain: str) -> float:
-    """Blocks or objects per m2: what is asked for, or what is usual on the terrain."""
-    return DENSITY.get(terrain, 1.0) if density is None else density
 
 
 def height_fractions(ground: Ground) -> np.ndarray | None:

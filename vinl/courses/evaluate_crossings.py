@@ -104,7 +104,11 @@ def compare_crossings(
     Raises:
         InputError: a number is out of range, or a policy observes what there is not.
     """
-    check_crossing_numbers(heights, crossings, seed, workers)
+    if not 1 <= len(heights) <= MAX_HEIGHTS or len(set(heights)) < len(heights):
+        raise InputError(f"--height takes 1 to {MAX_HEIGHTS} different heights [m], got {len(heights)}")
+    check_number("--crossings", crossings, 1, MAX_CROSSINGS)
+    check_number("--seed", seed, 0, 2**31 - 1)
+    check_number("--workers", workers, 1, 1024)
     for policy in policies:
         check_locomotion_policy(policy)
     bars = [
@@ -134,19 +138,6 @@ def compare_crossings(
         traces = {h: [t for record, t in own if t is not None and record.height == h] for h in heights if traced}
         results.append(CrossingResults(records, figures, {"locomotion": describe_policy(policy)}, config, wall, traces))
     return results
-
-
-def check_crossing_numbers(heights: Sequence[float], crossings: int, seed: int, workers: int) -> None:
-    """Refuse numbers that make no sense; ``BarConfig`` checks the bars.
-
-    Raises:
-        InputError: one of them is out of range.
-    """
-    if not 1 <= len(heights) <= MAX_HEIGHTS or len(set(heights)) < len(heights):
-        raise InputError(f"--height takes 1 to {MAX_HEIGHTS} different heights [m], got {len(heights)}")
-    check_number("--crossings", crossings, 1, MAX_CROSSINGS)
-    check_number("--seed", seed, 0, 2**31 - 1)
-    check_number("--workers", workers, 1, 1024)
 
 
 def aggregate_crossings(records: Sequence[CrossingRecord]) -> dict[str, Any]:

@@ -138,39 +138,28 @@ class Ground:
 
 def build_ground(config: GroundConfig) -> Ground:
     """Draw the ground and compile it."""
-    middle, none = np.zeros((1, 3)), np.array([-1])
     if config.terrain == "rough":
         return _build_rough(config)
     if config.terrain == "rooms":
         return _build_rooms(config)
-    if config.terrain == "litter":
-        return _build_litter(config)
-    cells = round(2 * (FIELD + 2) / _RESOLUTION) + 1
-    field = flat_field(GridFrame(-(FIELD + 2), -(FIELD + 2), _RESOLUTION, (cells, cells)))
+    among = config.terrain == "litter"
+    half, r = (LITTER_FIELD, _LITTER_RESOLUTION) if among else (FIELD, _RESOLUTION)
+    cells = round(2 * (half + 2) / r) + 1
+    field = flat_field(GridFrame(-(half + 2), -(half + 2), r, (cells, cells)))
+    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence([config.seed, UNSEEN])))
     blocks = Blocks.empty()
-    if config.terrain == "blocks" and config.density > 0:
-        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence([config.seed, UNSEEN])))
+    if among:
+        blocks = draw_litter(rng, config.density, half)
+    elif config.terrain == "blocks" and config.density > 0:
         spacing = 0.75 if config.density <= 1 else 0.75 / config.density**0.5
-        count = round(config.density * (2 * FIELD) ** 2)
-        centres = scatter_centres(rng, count, FIELD, 0.0, spacing, np.zeros((0, 2)))
-        blocks = draw_blocks(rng, centres, (0.1, 0.2))
-        raise_boxes(field, blocks.boxes(), BLOCK)
+        count = round(config.density * (2 * half) ** 2)
+        blocks = draw_blocks(rng, scatter_centres(rng, count, half, 0.0, spacing, np.zeros((0, 2))), (0.1, 0.2))
+    raise_boxes(field, blocks.boxes(), BLOCK)
     model = build_scene(Boxes.empty(), blocks.boxes(), kp=config.kp, kd=config.kd)
     # at density 0 robots are put back as on blocks, so that both trials are alike but for the blocks
-    reach = FIELD - 1 if config.terrain == "blocks" else np.inf
-    return Ground(model, field, middle, none, [config.terrain], reach, FIELD * 2 / 3, blocks, Boxes.empty())
-
-
-def _build_litter(config: GroundConfig) -> Ground:
-    cells = round(2 * (LITTER_FIELD + 2) / _LITTER_RESOLUTION) + 1
-    field = flat_field(GridFrame(-(LITTER_FIELD + 2), -(LITTER_FIELD + 2), _LITTER_RESOLUTION, (cells, cells)))
-    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence([config.seed, UNSEEN])))
-    litter = draw_litter(rng, config.density, LITTER_FIELD)
-    raise_boxes(field, litter.boxes(), BLOCK)
-    model = build_scene(Boxes.empty(), litter.boxes(), kp=config.kp, kd=config.kd)
-    spread, reach = LITTER_FIELD * 2 / 3, LITTER_FIELD - 1
-    middle, none = np.zeros((1, 3)), np.array([-1])
-    return Ground(model, field, middle, none, ["litter"], reach, spread, litter, Boxes.empty(), among=True)
+    reach = np.inf if config.terrain == "flat" else half - 1
+    homes, levels, kinds = np.zeros((1, 3)), np.array([-1]), [config.terrain]
+    return Ground(model, field, homes, levels, kinds, reach, half * 2 / 3, blocks, Boxes.empty(), among)
 
 
 def _build_rough(config: GroundConfig) -> Ground:

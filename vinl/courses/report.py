@@ -19,7 +19,7 @@ from vinl.courses.evaluate import TrialResults
 from vinl.courses.evaluate_crossings import CrossingResults
 from vinl.courses.robot_records import HEIGHT_NAMES, RobotRecord
 from vinl.render.drawing import format_number, open_table
-from vinl.render.film_file import write_caption, write_film
+from vinl.render.panels import write_caption, write_film
 from vinl.render.raytrace import RayRenderer, look_at
 from vinl.render.scene import BLOCK, RobotShape, plain_scene
 from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS, LEGS, foot_positions
@@ -97,12 +97,10 @@ def draw_feet(traces: Mapping[str, Sequence[CrossingTrace]], height: float, dept
         height, depth: of the bar [m].
         path: of the picture.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
     figure = Figure(figsize=(11, 2.6 * len(traces) + 0.4), layout="constrained")
-    FigureCanvasAgg(figure)
     panels = figure.subplots(len(traces), 2, sharex=True, sharey=True, squeeze=False)
     for row, (name, crossings) in zip(panels, traces.items(), strict=True):
         for axes, pair, title in zip(row, ((0, 1), (2, 3)), ("front feet", "rear feet"), strict=True):
@@ -184,10 +182,7 @@ _FRACTIONS = (
 )
 """Columns in per cent."""
 
-_MEANS = (
-    ("foot_steps_per_crossing", "feet"),
-    ("leg_steps_per_crossing", "legs"),
-)
+_MEANS = (("foot_steps_per_crossing", "feet"), ("leg_steps_per_crossing", "legs"))
 """Columns in control steps on the bar per crossing."""
 
 
@@ -297,11 +292,9 @@ def results_as_dict(compared: Mapping[str, TrialResults[Any]], command: Sequence
 
 def draw_contacts(compared: Mapping[str, TrialResults[RobotRecord]], path: Path) -> None:
     """Contacts per metre of front and rear feet and legs with their intervals, and of the feet by block height."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 4), layout="constrained")
-    FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2)
     width = 0.8 / len(compared)
     for k, (name, results) in enumerate(compared.items()):

@@ -4,7 +4,7 @@ all of them with their 95 % intervals."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import pairwise
 from typing import Any
 
@@ -178,19 +178,19 @@ def aggregate_robots(
     for name, column, over in (
         ("linear_velocity_rmse", "linear", "steps"),
         ("yaw_rate_rmse", "yaw", "steps"),
-        ("linear_velocity_rmse_settled", "linear_settled", "settled"),
-        ("yaw_rate_rmse_settled", "yaw_settled", "settled"),
+        ("linear_velocity_rmse_settled", "linear_settled", "settled_steps"),
+        ("yaw_rate_rmse_settled", "yaw_settled", "settled_steps"),
     ):
         add(name, column, over, np.sqrt)
     for limb in ("foot", "leg"):
-        for part in ("", "_front", "_rear"):
-            add(f"{limb}{part}_block_per_m", f"{limb}{part}", "metres")
-    add("trunk_block_per_m", "trunk", "metres")
+        for part, column in (("", f"{limb}_block_steps"), ("_front", f"{limb}_front"), ("_rear", f"{limb}_rear")):
+            add(f"{limb}{part}_block_per_m", column, "metres")
+    add("trunk_block_per_m", "trunk_block_steps", "metres")
     if covered:
-        add("dirty_steps", "dirty", "swings")
-        add("dirty_foot_steps", "dirty_foot", "swings")
+        add("dirty_steps", "dirty_swings", "swings")
+        add("dirty_foot_steps", "dirty_foot_swings", "swings")
         figures["steps"] = int(columns["swings"].sum())
-        add("trunk_over_blocks", "over", "steps", lambda fraction: fraction / covered)
+        add("trunk_over_blocks", "over_block_steps", "steps", lambda fraction: fraction / covered)
     figures["metres"] = float(columns["metres"].sum())
     levels = [r.level for r in records if r.level is not None]
     figures["mean_level"] = float(np.mean(levels)) if levels else None
@@ -210,27 +210,16 @@ def aggregate_robots(
 
 
 def _columns(records: Sequence[RobotRecord]) -> dict[str, Float[np.ndarray, " n"]]:
-    errors = np.array([r.errors for r in records], np.float64)
-    named = {name: errors[:, k] for k, name in enumerate(("linear", "yaw", "linear_settled", "yaw_settled"))}
-    for name, get in (
-        ("falls", lambda r: r.falls),
-        ("steps", lambda r: r.steps),
-        ("settled", lambda r: r.settled_steps),
-        ("metres", lambda r: r.metres),
-        ("foot", lambda r: r.foot_block_steps),
-        ("leg", lambda r: r.leg_block_steps),
-        ("over", lambda r: r.over_block_steps),
-        ("trunk", lambda r: r.trunk_block_steps),
-        ("swings", lambda r: r.swings),
-        ("dirty", lambda r: r.dirty_swings),
-        ("dirty_foot", lambda r: r.dirty_foot_swings),
-        ("foot_front", lambda r: r.foot_pair_steps[0]),
-        ("foot_rear", lambda r: r.foot_pair_steps[1]),
-        ("leg_front", lambda r: r.leg_pair_steps[0]),
-        ("leg_rear", lambda r: r.leg_pair_steps[1]),
-    ):
-        named[name] = np.array([get(r) for r in records], np.float64)
-    return named
+    """A column for each number of the records, those in lists by names of their own."""
+
+    def read(name: str) -> np.ndarray:
+        return np.array([getattr(r, name) for r in records], np.float64)
+
+    columns = {f.name: read(f.name) for f in fields(RobotRecord) if f.type in ("int", "float")}
+    columns |= zip(("linear", "yaw", "linear_settled", "yaw_settled"), read("errors").T, strict=True)
+    for limb in ("foot", "leg"):
+        columns |= zip((f"{limb}_front", f"{limb}_rear"), read(f"{limb}_pair_steps").T, strict=True)
+    return columns
 
 
 _STEADY = 2

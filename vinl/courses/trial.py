@@ -114,7 +114,11 @@ def run_trial(
         What was counted, robot by robot.
     """
     n = len(courses)
-    records = [_new_record(ground, course) for course in courses]
+    levels = [int(ground.levels[course.home]) for course in courses]
+    records = [
+        RobotRecord(course.robot, ground.kinds[course.home], level if level >= 0 else None)
+        for course, level in zip(courses, levels, strict=True)
+    ]
     homes = np.array([ground.homes[course.home, :2] for course in courses])
     commands, fresh = np.stack([c.commands for c in courses], 1), np.stack([c.fresh for c in courses], 1)
     controller = controller_on_course(policy, ground, n)
@@ -163,11 +167,6 @@ def controller_on_course(policy: Policy, ground: Ground, n: int) -> LocomotionCo
         bare = np.where(ground.field.labels == WALL, 0.0, ground.field.heights).astype(np.float32)
         gait = GaitReader(config, map_ground(bare, ground.field.frame, ground.blocks.boxes() + ground.walls))
     return LocomotionController(policy, scan, cameras, gait)
-
-
-def _new_record(ground: Ground, course: Course) -> RobotRecord:
-    level = int(ground.levels[course.home])
-    return RobotRecord(course.robot, ground.kinds[course.home], level if level >= 0 else None)
 
 
 def _add_touches(

@@ -19,13 +19,7 @@ from vinl.world.floorplan import FloorPlan
 HOME_FILE, EPISODES_FILE = "home.xml", "episodes.json"
 
 
-def export_home(
-    plan: FloorPlan,
-    out: str | Path,
-    episodes: int = 10,
-    obstacles: str = "paper",
-    seed: int = 0,
-) -> Path:
+def export_home(plan: FloorPlan, out: str | Path, episodes: int = 10, obstacles: str = "paper", seed: int = 0) -> Path:
     """Write a home and episodes in it, the same as those of ``vinl eval``.
 
     ``home.xml`` holds the robot, walls and furniture, and a body ``blocks`` without geoms; ``episodes.json`` the time

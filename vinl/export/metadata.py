@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from importlib.metadata import version
 from typing import Any
@@ -10,7 +11,7 @@ from vinl.chain.config import EvaluationConfig
 from vinl.chain.controller import ACTION_LIMIT
 from vinl.config.errors import InputError
 from vinl.config.loader import closest
-from vinl.export.step import DEPTH, NEXT, Step
+from vinl.export.step import DEPTH, NEXT, StateInput, Step
 from vinl.policies.card import PolicyCard
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.identity import digest_weights
@@ -89,10 +90,15 @@ def describe_step(policy: LocomotionPolicy | DepthPolicy, step: Step) -> dict[st
         "samples": card.samples,
         "robot": "Unitree AlienGo",
         "observation": explain_rows(card.observation),
-        "states": [_describe_state(state.name, state.start.tolist(), list(state.start.shape)) for state in step.states],
+        "states": [_describe_state(state) for state in step.states],
         **(_describe_navigation(card) if card.kind == "navigation" else _describe_locomotion(card)),
         **({} if policy.camera is None else _describe_camera(policy.camera)),
     }
+
+
+def read_metadata(properties: dict[str, str]) -> dict[str, Any]:
+    """The metadata as it was, from what a runtime or ``onnx`` reads from the file."""
+    return {key: json.loads(value) for key, value in properties.items()}
 
 
 def _describe_locomotion(card: PolicyCard) -> dict[str, Any]:
@@ -137,16 +143,12 @@ def _describe_camera(camera: Camera) -> dict[str, Any]:
     }
 
 
-def _describe_state(name: str, start: Any, shape: list[int]) -> dict[str, Any]:
+def _describe_state(state: StateInput) -> dict[str, Any]:
     """``start`` is one number if all are alike."""
-    numbers = set(_flatten(start))
+    start, first = state.start, state.start.flatten()[0]
     return {
-        "input": name,
-        "output": name + NEXT,
-        "shape": shape,
-        "start": numbers.pop() if len(numbers) == 1 else start,
+        "input": state.name,
+        "output": state.name + NEXT,
+        "shape": list(start.shape),
+        "start": first.item() if (start == first).all() else start.tolist(),
     }
-
-
-def _flatten(nested: Any) -> list[float]:
-    return [number for part in nested for number in _flatten(part)] if isinstance(nested, list) else [nested]

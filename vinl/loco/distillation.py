@@ -14,10 +14,13 @@ from tensordict import TensorDict
 from torch import Tensor, nn
 from torch.nn import functional
 
+from vinl.gait.local_map import POINTS
+from vinl.gait.observation import SENSED_TABLE
 from vinl.gait.state import GaitState
 from vinl.loco.student_config import DistillationConfig
 from vinl.policies.networks import StepActor
 from vinl.policies.stepping_actor import Memory, Prediction, SteppingActor
+from vinl.rl.step_graph import StepGraph
 from vinl.rl.stopwatch import Stopwatch
 from vinl.robot.observation import PROPRIOCEPTION, PROPRIOCEPTION_SIZE
 
@@ -70,10 +73,16 @@ class Distillation:
         self._fresh = torch.zeros(t, n, dtype=torch.bool, device=device)
         self._state = student.initial_state(n, device)
         self._starts = [tuple(torch.zeros_like(x) for x in self._network_state()) for _ in range(t // config.bptt)]
+        self._vector = torch.zeros(n, SENSED_TABLE.size, device=device)
+        self._depth = torch.zeros(n, *(student.image or (0, 0)), dtype=torch.float16, device=device)
+        self._truth = Prediction(torch.zeros(n, 3, device=device), torch.zeros(n, len(POINTS), device=device))
+        self._told = torch.zeros(n, 1, dtype=torch.bool, device=device)
+        self._action = torch.zeros(n, student.action_size, device=device)
         self._begun = torch.ones(n, dtype=torch.bool, device=device)
-        self._order = torch.arange(n, device=device) / n
+        self._order, self._steps = torch.arange(n, device=device)[:, None] / n, torch.arange(t, device=device)
         self._mapping = torch.zeros(2, device=device)  # squared errors of the maps, and squares of the heights
         self._step = 0
+        self._graph = StepGraph(self._walk) if self.device.type == "cuda" else None
 
     def gait(self) -> GaitState:
         """The gait that the student keeps of every robot."""
@@ -82,29 +91,45 @@ class Distillation:
     # ---- roll-out -------------------------------------------------------------------------------------------------
 
     def act(self, obs: TensorDict) -> Float[Tensor, "n 12"]:
-        """The student's actions; keeps what was seen, and what was true."""
+        """The student's actions, good until the next call; keeps what was seen, and what was true.
+
+        On a GPU the two thousand launches of a step are one CUDA graph, which reads and writes where they are.
+        """
         with self._stopwatch.part("network"):
-            k, c, student = self._step, self.config, self.student
-            vector = obs["policy"][:, _SENSED]
-            truth = Prediction(obs["velocity"], obs["heights"])
-            memory = student.begin(vector, student.unpack(self._state), self._begun)
-            inputs = student.network_input(vector, memory)
-            for kept, now in (
-                (self._inputs, inputs), (self._velocity, truth.velocity), (self._fresh, self._begun),
-            ):  # fmt: skip
-                kept[k].copy_(now)
-            if k % c.bptt == 0:
-                for start, now in zip(self._starts[k // c.bptt], memory.network, strict=True):
+            self._vector.copy_(obs["policy"][:, _SENSED])
+            for kept, name in (
+                (self._depth, "depth"),
+                (self._truth.velocity, "velocity"),
+                (self._truth.heights, "heights"),
+            ):
+                kept.copy_(obs[name])
+            self._told.copy_(self._order < self.teacher_fraction)
+            if self._step % self.config.bptt == 0:
+                for start, now in zip(self._starts[self._step // self.config.bptt], self._network_state(), strict=True):
                     start.copy_(now)
-            said, network = student.estimate(inputs[None], memory.network, self._fresh[k : k + 1])
-            told = self._order[:, None] < self.teacher_fraction
-            velocity = torch.where(told, truth.velocity, said[0])
-            heights, map_ = student.survey(obs["depth"], vector, velocity, memory)
-            self._mapping += torch.stack([((heights - truth.heights) ** 2).sum(), (truth.heights**2).sum()])
-            believed = Prediction(velocity, torch.where(told, truth.heights, heights))
-            action, gait = student.walk(vector, believed, memory)
-            self._state = student.pack(Memory(network, gait, velocity, map_))
-            return action
+            now = self._steps[self._step : self._step + 1]
+            if self._graph is None:
+                self._walk(now)
+            else:
+                self._graph.run(now)
+            return self._action
+
+    def _walk(self, step: Tensor) -> None:
+        """One step of the roll-out; ``step`` (1,) is its number."""
+        student, vector, truth, told = self.student, self._vector, self._truth, self._told
+        memory = student.begin(vector, student.unpack(self._state), self._begun)
+        inputs = student.network_input(vector, memory)
+        for kept, now in ((self._inputs, inputs), (self._velocity, truth.velocity), (self._fresh, self._begun)):
+            kept.index_copy_(0, step, now[None])
+        said, network = student.estimate(inputs[None], memory.network, self._begun[None])
+        velocity = torch.where(told, truth.velocity, said[0])
+        heights, map_ = student.survey(self._depth, vector, velocity, memory)
+        self._mapping += torch.stack([((heights - truth.heights) ** 2).sum(), (truth.heights**2).sum()])
+        believed = Prediction(velocity, torch.where(told, truth.heights, heights))
+        action, gait = student.walk(vector, believed, memory)
+        self._action.copy_(action)
+        for kept, now in zip(self._state, student.pack(Memory(network, gait, velocity, map_)), strict=True):
+            kept.copy_(now)
 
     def process_env_step(self, obs: TensorDict, rewards: Tensor, dones: Tensor, extras: dict[str, Any]) -> None:
         """Remember whose episode begins with the next step."""
@@ -184,5 +209,6 @@ class Distillation:
         """Go on from what ``save`` gave."""
         self.student.load_state_dict(loaded_dict["student"], strict=strict)
         self.optimizer.load_state_dict(loaded_dict["optimizer"])
-        self._state = tuple(x.to(self.device) for x in loaded_dict["memory"])
+        for kept, x in zip(self._state, loaded_dict["memory"], strict=True):
+            kept.copy_(x)
         self._begun.copy_(loaded_dict["begun"])

@@ -159,7 +159,7 @@ class LocoEnvironment:
         Args:
             action: of the robots.
             gait: that the robots follow, in place of the environment's own: a student keeps one by what it believes,
-                and what is planned for it must be planned for its clock. None: the environment's.
+                and plans for it. None: the environment's, which in stage 3 plans nothing.
         """
         if gait is not None:
             # copies: the step reuses the memory of the state that it is given
@@ -266,7 +266,9 @@ class LocoEnvironment:
         body = Body(*(jnp.where(broken[:, None], last, now) for now, last in zip(body, old.body, strict=True)))
         torque = jnp.where(broken[:, None], 0.0, torque)
 
-        gait, steps = go_on(c.gait, ground, self.simulation.frame, old.gait, old.body, body, old.command)
+        gait, steps = go_on(
+            c.gait, ground, self.simulation.frame, old.gait, old.body, body, old.command, planned=c.stage < 3
+        )
         motion = self._motion(ground, old, body, contacts, torque, action, broken, steps)
         terms = reward_terms(motion, rewards["sigma"])
         weighted = {name: terms[name] * (rewards[name] * CONTROL_DT) for name in TERMS}

@@ -8,7 +8,6 @@ once, the optimiser is one kernel, and on request whole minibatches are one CUDA
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
 from typing import Any
 
 import torch
@@ -17,14 +16,12 @@ from tensordict import TensorDict
 from torch import Tensor, nn
 
 from vinl.rl.learning_rate import DeviceRate
+from vinl.rl.step_graph import StepGraph
 
 _LOWEST, _HIGHEST = 1e-5, 1e-2
 """Limits of rsl-rl's adaptive learning rate."""
 
 _LOSSES = ("value", "surrogate", "entropy")
-
-_WARM_UP = 3
-"""So many first steps run as they are, on a stream of their own, so that libraries set up what they need."""
 
 
 class FastPPO(PPO):
@@ -170,50 +167,3 @@ class FastPPO(PPO):
         nn.utils.clip_grad_norm_(self.critic.parameters(), self.max_grad_norm)
         self.optimizer.step()
         self._sums += torch.stack([value_loss.detach(), surrogate.detach(), entropy.detach()])
-
-
-class StepGraph:
-    """Calls a step of an optimiser on an index: after the first calls as one CUDA graph.
-
-    The function may read and write only tensors that stay where they are, must not wait for the device, and must set
-    gradients to None before it computes them.
-
-    Args:
-        step: takes an index (n,) of always the same length.
-    """
-
-    def __init__(self, step: Callable[[Tensor], None]) -> None:
-        self._step = step
-        self._graphs: dict[Hashable, torch.cuda.CUDAGraph] = {}
-        self._counts: dict[Hashable, int] = {}
-        self._index: Tensor | None = None
-
-    def run(self, index: Tensor, variant: Hashable = None) -> None:
-        """One step.
-
-        Args:
-            index: (n,) whole numbers.
-            variant: what the function branches on; each variant is a graph of its own.
-        """
-        if self._index is None:
-            self._index = index.clone()
-        self._index.copy_(index)
-        if variant not in self._graphs:
-            count = self._counts[variant] = self._counts.get(variant, 0) + 1
-            if count <= _WARM_UP:
-                self._run_beside()
-                return
-            graph = torch.cuda.CUDAGraph()
-            # thread_local: what JAX's threads ask of the device meanwhile is none of this capture's business
-            with torch.cuda.graph(graph, capture_error_mode="thread_local"):
-                self._step(self._index)
-            self._graphs[variant] = graph
-        self._graphs[variant].replay()
-
-    def _run_beside(self) -> None:
-        assert self._index is not None
-        side = torch.cuda.Stream()
-        side.wait_stream(torch.cuda.current_stream())
-        with torch.cuda.stream(side):
-            self._step(self._index)
-        torch.cuda.current_stream().wait_stream(side)

@@ -70,6 +70,7 @@ def go_on(
     before: Body,
     body: Body,
     command: Float[Array, "n 3"],
+    planned: bool = True,
 ) -> tuple[GaitState, Steps]:
     """One control step of the gait, planned on the exact map and with the exact velocity.
 
@@ -79,13 +80,15 @@ def go_on(
         gait: before the step.
         before, body: the robots before and after the step.
         command: that they have.
+        planned: False: the clock runs on, but whoever gave ``gait`` plans its footholds.
     """
     feet, velocity = feet_in_heading_frame(jnp, body.qpos), velocity_in_heading_frame(jnp, body.qpos, body.qvel)
     moved = motion_between(jnp, before.qpos, body.qpos)
     gait = tick(jnp, config, gait, moved, command, feet)
     view = FieldView(jnp, ground.map, frame, body.qpos)
-    plan = plan_footholds(jnp, config, view if config.map else None, gait, velocity, command, feet)
-    gait = aim(jnp, config, gait, plan, velocity, command, feet)
+    if planned:
+        plan = plan_footholds(jnp, config, view if config.map else None, gait, velocity, command, feet)
+        gait = aim(jnp, config, gait, plan, velocity, command, feet)
 
     swing, fraction = swings(jnp, config, gait), swing_fraction(jnp, config, gait.period)[:, None]
     progress = gait.phases / fraction

@@ -10,7 +10,6 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from vinl.config.errors import InputError
 from vinl.config.loader import load_config
 from vinl.nav.config import NavConfig
 from vinl.nav.environment import NavEnvironment
@@ -47,14 +46,11 @@ def run_nav(
         triangles on the device for each home, ``device_gigabytes`` in use by all (GPU only), and what was measured.
 
     Raises:
-        InputError: a number is not positive, or the device is not there.
+        InputError: the device is not there.
     """
     on_gpu = device.startswith("cuda")
     num_envs = (4096 if on_gpu else 32) if num_envs is None else num_envs
     homes = (1000 if on_gpu else 16) if homes is None else homes
-    for name, value in {"num_envs": num_envs, "homes": homes, "seconds": seconds}.items():
-        if not value > 0:
-            raise InputError(f"bench nav: {name} must be positive, got {value}")
     config = config or load_config(NavConfig, "nav/default")
     config = replace(config, num_envs=num_envs, homes=replace(config.homes, count=homes))
     used = _device_bytes(device)

@@ -22,23 +22,18 @@ from vinl.config.errors import InputError
 from vinl.config.limits import check_fields, check_number
 from vinl.config.loader import build_config, load_config
 from vinl.nav.config import EpisodeConfig, NavCameraConfig, NavConfig
-from vinl.nav.environment import NavEnvironment
+from vinl.nav.environment import EpisodeEnd, NavEnvironment
 from vinl.nav.home_store import HomeStore
-from vinl.nav.measures import EpisodeEnd
 from vinl.policies.card import PolicyCard, find_previous
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.policies.velocity_range import VelocityRange
 from vinl.sensing.sensor_config import OdometryConfig, load_sensors
-from vinl.world.endings import END_REASONS as ALL_REASONS
-from vinl.world.endings import FALL, SUCCESS, name_late_end
+from vinl.world.endings import SUCCESS, name_late_end
 from vinl.world.free_space import FreeSpace
 from vinl.world.homes.generate import find_judging_set
 from vinl.world.readers import expand_paths, shipped_floorplans
 from vinl.world.start_goal import measure_route, shortest_distance
-
-END_REASONS = tuple(reason for reason in ALL_REASONS if reason != FALL)
-"""How an episode ends; nothing falls here."""
 
 _CHECK_EVERY = 25
 
@@ -123,7 +118,11 @@ def evaluate_kind(
             end = environment.ended
             assert end is not None
             first = end.counted & ~over
-            figures = end if figures is None else EpisodeEnd(*map(_pick(first), end, figures))
+            figures = (
+                end
+                if figures is None
+                else EpisodeEnd(*(torch.where(first, now, then) for now, then in zip(end, figures, strict=True)))
+            )
             over |= end.counted
             paths.append(torch.where((over & ~first)[:, None], paths[-1], state["position"]))
             environment.restart(end.counted)
@@ -212,10 +211,6 @@ def _record(
         collisions=round(ended["collisions"]),
         left_m=round(ended["end_distance"], 3),
     )
-
-
-def _pick(chosen: torch.Tensor) -> Callable[[torch.Tensor, torch.Tensor], torch.Tensor]:
-    return lambda now, before: torch.where(chosen, now, before)
 
 
 MOTIONS = {

@@ -1,5 +1,4 @@
-"""Distance fields to many goals at once, and clearance, by compiled code on the CPU: fast enough to build homes while
-training runs."""
+"""Distance fields to many goals at once by compiled code on the CPU: fast enough to build homes while training runs."""
 
 # ruff: noqa: UP018, RUF046 - a variable of a kernel that changes must be made by its type
 # pyright: reportInvalidTypeForm=false, reportCallIssue=false, reportArgumentType=false
@@ -10,7 +9,7 @@ from typing import no_type_check
 
 import numpy as np
 import warp as wp
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from vinl.sensing.warp_start import start_warp
 
@@ -74,30 +73,6 @@ def spread_fields(
         device="cpu",
     )
     return metres
-
-
-def measure_near_clearance(
-    free: Bool[np.ndarray, "rows columns"], resolution: float, reach: float
-) -> Float[np.ndarray, "rows columns"]:
-    """Distance from each cell's centre to the edge of the nearest cell that is not free, where the outside is not free.
-
-    Args:
-        free: the floor.
-        resolution: side of a cell [m].
-        reach: distances beyond this read as about this [m].
-
-    Returns:
-        float16 [m]; 0 where not free.
-    """
-    cells = math.ceil(reach / resolution) + 1
-    floor = np.ascontiguousarray(np.pad(free, 1).astype(np.uint8))
-    gap = _wrap(np.empty(floor.shape, np.int32))
-    clearance = np.empty(floor.shape, np.float16)
-    wp.launch(measure_down, dim=floor.shape[1], inputs=[_wrap(floor), cells], outputs=[gap], device="cpu")
-    wp.launch(
-        measure_across, dim=floor.shape, inputs=[gap, cells, resolution], outputs=[_wrap(clearance)], device="cpu"
-    )
-    return np.ascontiguousarray(clearance[1:-1, 1:-1])
 
 
 def _wrap(values: np.ndarray) -> wp.array:
@@ -180,47 +155,3 @@ def write_metres(
     for k in range(metres.shape[2]):
         steps = counted[k, r + border, c + border]
         metres[r, c, k] = wp.where(steps >= 0 and steps < far, wp.float16(wp.float32(steps) * unit), wp.float16(wp.inf))
-
-
-@wp.kernel
-@no_type_check
-def measure_down(free: wp.array(dtype=wp.uint8, ndim=2), reach: wp.int32, gap: wp.array(dtype=wp.int32, ndim=2)):
-    """Cells to the nearest one that is not free in the same column, at most ``reach``; outside nothing is free."""
-    column = wp.tid()
-    rows = free.shape[0]
-    run = int(0)
-    for r in range(rows):
-        run = wp.where(free[r, column] == wp.uint8(0), 0, wp.min(run + 1, reach))
-        gap[r, column] = run
-    run = int(0)
-    for i in range(rows):
-        r = rows - 1 - i
-        run = wp.where(free[r, column] == wp.uint8(0), 0, wp.min(run + 1, reach))
-        gap[r, column] = wp.min(gap[r, column], run)
-
-
-@wp.kernel
-@no_type_check
-def measure_across(
-    gap: wp.array(dtype=wp.int32, ndim=2),
-    reach: wp.int32,
-    resolution: wp.float32,
-    clearance: wp.array(dtype=wp.float16, ndim=2),
-):
-    """Distance [m] from a cell's centre to the edge of the nearest cell that is not free, held to ``reach`` cells."""
-    r, c = wp.tid()
-    columns = gap.shape[1]
-    best = gap[r, c] * gap[r, c]
-    d = int(1)
-    while d * d < best and d <= reach:
-        left = int(0)
-        right = int(0)
-        if c - d >= 0:
-            left = gap[r, c - d]
-        if c + d < columns:
-            right = gap[r, c + d]
-        near = wp.min(left, right)
-        best = wp.min(best, d * d + near * near)
-        d = d + 1
-    value = wp.max((wp.sqrt(wp.float32(best)) - 0.5) * resolution, 0.0)
-    clearance[r, c] = wp.float16(value)

@@ -22,9 +22,8 @@ from PIL import Image, ImageDraw
 from vinl.config.errors import InputError
 from vinl.config.loader import load_config
 from vinl.nav.config import NavConfig, RobotConfig
-from vinl.nav.environment import NavEnvironment
+from vinl.nav.environment import EpisodeEnd, NavEnvironment
 from vinl.nav.home_store import HomeRecord, HomeStore
-from vinl.nav.measures import EpisodeEnd
 from vinl.sensing.preparation import MARK
 from vinl.world.boxes import Blocks, Boxes
 

@@ -13,9 +13,9 @@ from jaxtyping import Float, Int, UInt8
 
 from vinl.config.errors import InputError
 from vinl.nav.config import ClutterConfig, NavConfig
-from vinl.nav.fields import measure_near_clearance, spread_fields
+from vinl.nav.fields import spread_fields
 from vinl.world.boxes import Blocks, Boxes
-from vinl.world.floorplan import RESOLUTION, FloorPlan
+from vinl.world.floorplan import RESOLUTION, FloorPlan, measure_clearance
 from vinl.world.grid import GridFrame
 from vinl.world.homes.config import layout_config
 from vinl.world.mesh import seen_box_mesh
@@ -27,7 +27,7 @@ FINE = 2
 FIELD_RESOLUTION = FINE * RESOLUTION
 """Side of a cell of the distance fields [m]."""
 
-REACH = 0.6
+REACH = 0.625
 """Clearance is known up to this [m]; more than half the robot's diagonal."""
 
 FRINGE = 0.12
@@ -165,7 +165,7 @@ def prepare_home(plan: FloorPlan, seed: int, config: NavConfig) -> BuiltHome | s
         raise InputError(f"{plan.source}: needs a grid of {RESOLUTION:g} m, got {plan.frame.resolution:g} m")
     rng = np.random.default_rng([seed, 68279])
     homes = config.homes
-    fine = measure_near_clearance(plan.free, RESOLUTION, REACH)
+    fine = np.minimum(measure_clearance(plan.free, RESOLUTION), REACH).astype(np.float16)
     region = find_largest(label_regions(fine[::FINE, ::FINE] >= homes.path_radius))
     if not region.any():
         return f"{plan.name}: the robot fits nowhere"

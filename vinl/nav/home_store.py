@@ -20,6 +20,7 @@ from vinl.nav.config import NavConfig
 from vinl.nav.home_builder import BuiltHome, HomeRecord, build_home, build_plan, prepare_home
 from vinl.nav.kernels import Homes
 from vinl.sensing.depth import build_mesh, check_device
+from vinl.sensing.torch_warp import find_stream
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers import check_file, expand_paths
 
@@ -62,7 +63,8 @@ class HomeStore:
             raise InputError("no home can be used" + (f"; the last: {reasons[-1]}" if reasons else ""))
         self.device, self.reasons = check_device(device), list(reasons)
         self.records = [HomeRecord(h.seed, h.name, h.frame, h.floor, h.solid, h.blocks) for h in built]
-        self._meshes = [self._build_mesh(home, tree) for home in built]
+        with wp.ScopedStream(find_stream(self.device)):  # in order with torch's work, which reads the meshes
+            self._meshes = [build_mesh(home.vertices, home.faces, str(self.device), tree) for home in built]
         count, ends = len(built), np.cumsum([home.cells for home in built])
         cells, first = int(ends[-1]), np.concatenate([[0], ends[:-1]]).astype(np.int32)
         if cells * 4 >= 2**31:
@@ -196,11 +198,6 @@ class HomeStore:
     def save_state(self) -> dict[str, Any]:
         """Which homes are here, by their seeds."""
         return {"seeds": [record.seed for record in self.records], "names": [record.name for record in self.records]}
-
-    def _build_mesh(self, home: BuiltHome, tree: str | None) -> wp.Mesh:
-        on_gpu = self.device.type == "cuda"  # in order with torch's work, which reads the mesh
-        with wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(self.device)) if on_gpu else None):
-            return build_mesh(home.vertices, home.faces, str(self.device), tree)
 
 
 def _count_workers(config: NavConfig, homes: int) -> int:

@@ -13,7 +13,7 @@ import warp as wp
 from vinl.nav.config import NavConfig
 from vinl.sensing.kernels import look_through
 from vinl.sensing.sensor_kernels import Cameras
-from vinl.sensing.structs import fill_struct
+from vinl.sensing.torch_warp import fill_struct
 from vinl.sensing.warp_start import start_warp
 
 start_warp()

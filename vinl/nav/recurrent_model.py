@@ -97,11 +97,7 @@ class RecurrentActorCritic(nn.Module):
         nn.init.zeros_(value.bias)
 
     def forward(
-        self,
-        depth: Tensor | None,
-        vector: Float[Tensor, "t n k"],
-        state: State,
-        fresh: Bool[Tensor, "t n"],
+        self, depth: Tensor | None, vector: Float[Tensor, "t n k"], state: State, fresh: Bool[Tensor, "t n"]
     ) -> Outlook:
         """What is made of t steps; images in [0, 1] or as bytes."""
         actor = cast(MemoryActor, self.actor)
@@ -244,33 +240,17 @@ CRITIC = "critic.safetensors"
 
 def build_actor(config: NavConfig) -> NavActor:
     """A navigator with fresh weights."""
-    camera = config.camera
+    camera, robot = config.camera, config.robot
     image: dict[str, Any] = {"vision": "none", "height": 1, "width": 1}
     if camera is not None:
         image = {"height": camera.height, "width": camera.width, "channels": 2 if camera.missing == "plane" else 1}
-    return NavActor(
-        **{
-            **asdict(config.network),
-            **image,
-            "previous": PREVIOUS_SIZE * (2 if config.previous == "both" else 1),
-            "places": _map_geometry(config).describe() if config.network.places else None,
-        }
-    )
-
-
-def _map_geometry(config: NavConfig) -> MapGeometry:
-    c, robot = config.camera or NavCameraConfig(), config.robot
-    return MapGeometry(
-        robot.min_speed,
-        robot.max_speed,
-        robot.max_yaw_rate,
-        robot.period,
-        c.hfov,
-        c.pitch_down,
-        c.far,
-        c.forward,
-        c.mount_height,
-    )
+    places = None
+    if config.network.places:
+        c, speeds = camera or NavCameraConfig(), (robot.min_speed, robot.max_speed, robot.max_yaw_rate)
+        view = c.hfov, c.pitch_down, c.far, c.forward, c.mount_height
+        places = MapGeometry(*speeds, robot.period, *view).describe()
+    previous = PREVIOUS_SIZE * (2 if config.previous == "both" else 1)
+    return NavActor(**{**asdict(config.network), **image, "previous": previous, "places": places})
 
 
 def load_start(policy: str, config: NavConfig) -> tuple[dict[str, torch.Tensor], PolicyCard]:

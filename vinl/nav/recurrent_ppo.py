@@ -68,8 +68,9 @@ class RecurrentPPO:
             capturable=on_gpu,  # type: ignore[arg-type]
         )
         rate.bind(self.optimizer)
-        if config.compiled and on_gpu:
-            _compile_vision(model)
+        vision = getattr(getattr(model.actor, "memory", None), "vision", None)
+        if config.compiled and on_gpu and isinstance(vision, nn.Module):
+            vision.compile(dynamic=False)  # fuses what lies between convolutions; the names of the weights stay
         self._state = tuple(part.clone() for part in storage.state)
         self._fresh = torch.ones(storage.robots, dtype=torch.bool, device=self.device)
         self._sums = torch.zeros(len(_SUMS), device=self.device)
@@ -250,14 +251,6 @@ def build_storage(config: NavConfig, actor: NavActor, device: torch.device | str
         device,
         hidden=count_guesses(config.ppo),
     )
-
-
-def _compile_vision(model: RecurrentActorCritic) -> None:
-    """Fuse norms, additions and type changes between the convolutions; the names of the weights stay."""
-    memory = getattr(model.actor, "memory", None)
-    vision = getattr(memory, "vision", None)
-    if isinstance(vision, nn.Module):
-        vision.compile(dynamic=False)
 
 
 def _log_prob(action: Tensor, mean: Tensor, log_std: Tensor) -> Tensor:

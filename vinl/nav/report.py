@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -14,8 +14,11 @@ from vinl.chain.metrics import summarise
 from vinl.render.drawing import draw_histogram, open_table, outline_boxes, outline_path, print_fitting, render_page
 from vinl.robot.aliengo import LENGTH
 from vinl.world.boxes import Blocks, Boxes
-from vinl.world.endings import SUCCESS
+from vinl.world.endings import END_REASONS, FALL, SUCCESS
 from vinl.world.floorplan import BODY_HEIGHT
+
+REASONS = tuple(reason for reason in END_REASONS if reason != FALL)
+"""How an episode ends; nothing falls here."""
 
 DISTANCES = (0.0, 5.0, 7.5, 10.0, 15.0, 20.0, 30.0, float("inf"))
 """Edges of the classes of geodesic distance [m]."""
@@ -26,11 +29,11 @@ _WORST, _MIDDLE = 6, 3
 _NAMED = 3
 """Homes named of every kind: those that most episodes were lost in."""
 
-_FIGURES = (("spl", "spl"), ("soft_spl", "soft_spl"), ("collisions", "collisions"), ("distance_m", "distance_m"))
+_FIGURES = ("spl", "soft_spl", "collisions", "distance_m", "time_s")
 _MARGIN = 0.4
 
 
-def aggregate_navigation(records: Sequence[Any], reasons: Iterable[str]) -> dict[str, Any]:
+def aggregate_navigation(records: Sequence[Any]) -> dict[str, Any]:
     """Means with 95 % intervals over episodes: Wilson's for success, by bootstrap otherwise; None without episodes.
 
     ``collisions`` are cancelled steps of an episode, ``time_s`` is over all episodes.
@@ -41,21 +44,21 @@ def aggregate_navigation(records: Sequence[Any], reasons: Iterable[str]) -> dict
         return {key: figure[key] for key in ("mean", "ci95")}
 
     figures: dict[str, Any] = {"success": over(lambda r: r.success, fraction=True)}
-    for name, field in (*_FIGURES, ("time_s", "time_s")):
-        figures[name] = over(lambda r, field=field: getattr(r, field))
+    for name in _FIGURES:
+        figures[name] = over(lambda r, name=name: getattr(r, name))
     figures["episodes"] = len(records)
-    figures["end_reasons"] = {reason: sum(r.end_reason == reason for r in records) for reason in reasons}
+    figures["end_reasons"] = {reason: sum(r.end_reason == reason for r in records) for reason in REASONS}
     return figures
 
 
-def aggregate_by_distance(records: Sequence[Any], reasons: Sequence[str]) -> list[dict[str, Any]]:
+def aggregate_by_distance(records: Sequence[Any]) -> list[dict[str, Any]]:
     """The figures of every class of geodesic distance that has episodes; ``to_m`` None: no end."""
     classes = []
     for low, high in pairwise(DISTANCES):
         mine = [r for r in records if low <= r.geodesic_m < high]
         if mine:
             end = high if np.isfinite(high) else None
-            classes.append({"from_m": low, "to_m": end, **aggregate_navigation(mine, reasons)})
+            classes.append({"from_m": low, "to_m": end, **aggregate_navigation(mine)})
     return classes
 
 
@@ -158,15 +161,15 @@ def _cells(figures: dict[str, Any]) -> list[str]:
     ]
 
 
-def count_failures(records: Sequence[Any], reasons: Sequence[str]) -> dict[str, Any]:
-    """Of the episodes of one kind: ``lost``, how many by each of the other ``reasons``, and ``homes`` with their
+def count_failures(records: Sequence[Any]) -> dict[str, Any]:
+    """Of the episodes of one kind: ``lost``, how many by each of the other ``REASONS``, and ``homes`` with their
     losses, the most first."""
     lost = [record for record in records if not record.success]
     homes = Counter(record.plan for record in lost)
     return {
         "episodes": len(records),
         "lost": len(lost),
-        "reasons": {reason: sum(r.end_reason == reason for r in lost) for reason in reasons if reason != SUCCESS},
+        "reasons": {reason: sum(r.end_reason == reason for r in lost) for reason in REASONS if reason != SUCCESS},
         "homes": dict(sorted(homes.items(), key=lambda item: (-item[1], item[0]))),
     }
 

@@ -49,12 +49,7 @@ class NavTrainingEnv:
         peers: the processes of the training.
     """
 
-    def __init__(
-        self,
-        environment: NavEnvironment,
-        places: bool = False,
-        peers: Peers | None = None,
-    ) -> None:
+    def __init__(self, environment: NavEnvironment, places: bool = False, peers: Peers | None = None) -> None:
         self.environment, self._places = environment, places
         self.num_envs = environment.num_envs * (peers.count if peers else 1)
 
@@ -125,7 +120,9 @@ def train_navigator(
     resume = config is None
     if config is None:
         config = build_config(NavConfig, run.open(), source=str(run.path / "config.yaml"))
-    check_minibatches(config)
+    robots, parts = config.num_envs, config.ppo.minibatches
+    if robots % parts:
+        raise InputError(f"num_envs must be a multiple of ppo.minibatches, got {robots} and {parts}")
     check_seeds(config, int(os.environ.get("WORLD_SIZE", "1")))
     peers, device = join_peers(device)
     origin = None
@@ -172,7 +169,7 @@ def train_navigator(
         if done == warmup > 0:  # it rose while the actor stood still
             learner.rate.set(config.ppo.learning_rate)
         for mark in config.ppo.keep_at:
-            kept = run.path / "kept" / name_samples(mark)
+            kept = run.path / "kept" / f"{mark / 1e6:g}M"
             if peers.leads and loop.samples >= mark and not kept.exists():
                 write(learner.model, loop.samples, kept)
 
@@ -204,32 +201,13 @@ def train_navigator(
 
 def describe_figures(row: dict[str, float]) -> dict[str, str]:
     """What the progress bar shows."""
-    shown = {"samples/s": f"{row['samples_per_second']:,.0f}", "samples": _say_count(row["samples"])}
+    samples = row["samples"]
+    said = f"{samples / 1e6:.1f} M" if samples >= 1_000_000 else f"{samples:,.0f}"
+    shown = {"samples/s": f"{row['samples_per_second']:,.0f}", "samples": said}
     for key, digits in (("success", 3), ("spl", 3), ("collisions", 1)):
         if key in row:
             shown[key] = f"{row[key]:.{digits}f}"
     return {**shown, "rate": np.format_float_positional(row["learning_rate"], 2, fractional=False)}
-
-
-def _say_count(samples: float) -> str:
-    return f"{samples / 1e6:.1f} M" if samples >= 1_000_000 else f"{samples:,.0f}"
-
-
-def name_samples(count: float) -> str:
-    """``2.5M`` for 2,500,000."""
-    return f"{count / 1e6:g}M"
-
-
-def check_minibatches(config: NavConfig) -> None:
-    """Robots must divide into minibatches.
-
-    Raises:
-        InputError: they do not.
-    """
-    if config.num_envs % config.ppo.minibatches:
-        raise InputError(
-            f"num_envs must be a multiple of ppo.minibatches, got {config.num_envs} and {config.ppo.minibatches}"
-        )
 
 
 def check_seeds(config: NavConfig, processes: int) -> None:

@@ -1,9 +1,14 @@
-"""The panels of a film: map, false-coloured depth, captions, and how they stand together."""
+"""What films are made of: panels (map, false-coloured depth, captions), how they stand together, and the file, which is
+written whole or not at all."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import errno
+import os
+import shutil
+from collections.abc import Iterable, Sequence
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -16,6 +21,9 @@ from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
 
 SIZE = (1280, 720)
 """Width and height of a film [pixels]."""
+
+_ROOM = 2**20
+"""Where less is free, the disk is full for a film [bytes]."""
 
 _SIDE, _EYE, _BAR = 480, (236, 142), 80
 _INK, _PAPER, _MUTED = (230, 232, 235), (24, 26, 30), (150, 155, 163)
@@ -64,7 +72,8 @@ class MapPanel:
             (plan.walls.below(BODY_HEIGHT), _WALL),
             (blocks.boxes(), _BLOCK),
         ):
-            self._fill(boxes, colour)
+            for corners in self._at(boxes.corners()) if len(boxes) else []:
+                self._pen.polygon([tuple(p) for p in corners.tolist()], fill=colour)
         self._disc(np.array(record.start), 0.15, _START)
         self._disc(np.array(record.goal), radius, _GOAL)
         self._drawn, self._touched = 0, 0
@@ -90,10 +99,6 @@ class MapPanel:
 
     def _at(self, xy: np.ndarray) -> np.ndarray:
         return self._centre + (xy - self._middle) * [self._scale, -self._scale]
-
-    def _fill(self, boxes: Boxes, colour: tuple[int, int, int]) -> None:
-        for corners in self._at(boxes.corners()) if len(boxes) else []:
-            self._pen.polygon([tuple(p) for p in corners.tolist()], fill=colour)
 
     def _disc(self, xy: np.ndarray, radius: float, colour: tuple[int, int, int]) -> None:
         (x, y), r = self._at(xy), radius * self._scale
@@ -122,3 +127,57 @@ def compose(
     for text, x in zip(captions, (24, 150, 480, 660, 1080), strict=True):
         pen.text((x, y + 27), text, fill=_INK, font=_font(20))
     return np.asarray(frame)
+
+
+def write_caption(frame: UInt8[np.ndarray, "height width 3"], text: str) -> UInt8[np.ndarray, "height width 3"]:
+    """The picture with a line of text in its upper left corner."""
+    picture = Image.fromarray(frame)
+    ImageDraw.Draw(picture).text((12, 8), text, fill=(30, 30, 30), font=_font(18))
+    return np.asarray(picture)
+
+
+def write_film(frames: Iterable[UInt8[np.ndarray, "height width 3"]], path: Path, rate: float) -> None:
+    """Write a film.
+
+    Args:
+        frames: pictures, all of one size; width and height are multiples of 16.
+        path: ``.mp4`` or ``.gif``.
+        rate: pictures a second.
+
+    Raises:
+        OSError: the disk is full, or nothing can be written there.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    scratch, writer = path.with_name(f".{path.name}"), None
+    try:
+        if path.suffix == ".gif":
+            pictures = [Image.fromarray(frame).quantize(128) for frame in frames]
+            pause = round(1000 / rate)
+            pictures[0].save(scratch, "GIF", save_all=True, append_images=pictures[1:], duration=pause, loop=0)
+        else:
+            import imageio_ffmpeg  # only here: all but films do without ffmpeg
+
+            for frame in frames:
+                if writer is None:
+                    size = (frame.shape[1], frame.shape[0])
+                    writer = imageio_ffmpeg.write_frames(
+                        str(scratch),
+                        size,
+                        fps=rate,  # type: ignore[arg-type]
+                        quality=6,
+                        ffmpeg_log_level="fatal",
+                    )
+                    writer.send(None)
+                writer.send(np.ascontiguousarray(frame))
+            if writer is not None:
+                writer.close()
+        scratch.replace(path)
+    except OSError as error:
+        # all that is known of an ffmpeg that has died is that it takes no more pictures
+        if shutil.disk_usage(path.parent).free > _ROOM:
+            raise
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path)) from error
+    finally:
+        if writer is not None:
+            writer.close()
+        scratch.unlink(missing_ok=True)

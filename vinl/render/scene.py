@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import mujoco
 import numpy as np
@@ -12,6 +11,7 @@ from jaxtyping import Float, Int
 
 from vinl.robot.model import robot_spec
 from vinl.world.boxes import Blocks, Boxes
+from vinl.world.floorplan import FloorPlan
 from vinl.world.grid import GridFrame
 from vinl.world.mesh import TRIANGLES_PER_BOX, box_mesh, join_meshes
 
@@ -28,20 +28,6 @@ FURNITURE = (
     (0.48, 0.53, 0.62),
 )
 """Muted, so that robot and blocks stand out."""
-
-
-@runtime_checkable
-class Home(Protocol):
-    """What a picture needs of a floor plan."""
-
-    @property
-    def walls(self) -> Boxes: ...
-
-    @property
-    def furniture(self) -> Boxes: ...
-
-    @property
-    def frame(self) -> GridFrame: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +71,7 @@ def plain_scene(
 
 
 def plan_scene(
-    plan: Home,
+    plan: FloorPlan,
     blocks: Blocks | None = None,
     goal: tuple[float, float] | None = None,
     wall_height: float = 1.0,
@@ -101,10 +87,7 @@ def plan_scene(
         furniture_height: furniture is cut here [m].
     """
     parts, colours = [], []
-    for boxes, height, palette in (
-        (plan.walls, wall_height, (WALL,)),
-        (plan.furniture, furniture_height, FURNITURE),
-    ):
+    for boxes, height, palette in ((plan.walls, wall_height, (WALL,)), (plan.furniture, furniture_height, FURNITURE)):
         cut = boxes.rows[boxes.rows[:, 5] < height - 0.02].copy()
         # Boxes that overlap must not share a plane: their colours would mix in a speckle.
         shift = 0.0007 * (np.arange(len(cut)) % 7)
@@ -170,14 +153,8 @@ class RobotShape:
         return self._data.xpos[1:].copy(), self._data.xmat[1:].reshape(-1, 3, 3).copy()
 
 
-def robot_bodies(model: mujoco.MjModel | None = None) -> list[BodyMesh]:
-    """The visual meshes of the robot, each in the frame of the body that carries it.
-
-    Args:
-        model: a compiled robot with visual meshes; a fresh one by default.
-    """
-    if model is None:
-        model = robot_spec("primitives", visual=True).compile()
+def robot_bodies(model: mujoco.MjModel) -> list[BodyMesh]:
+    """The visual meshes of a compiled robot, each in the frame of the body that carries it."""
     found = []
     for geom in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH):
         mesh = model.geom_dataid[geom]

@@ -13,8 +13,7 @@ from jaxtyping import Float, UInt8
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.records import Episode, name_episode
 from vinl.chain.rollout import InterruptedRunError
-from vinl.render.film_file import write_caption, write_film
-from vinl.render.panels import MapPanel, colour_depth, compose
+from vinl.render.panels import MapPanel, colour_depth, compose, write_caption, write_film
 from vinl.render.raytrace import ChaseCamera, RayRenderer, look_at
 from vinl.render.scene import BLOCK, FLOOR, WALL, RobotShape, Scene, plan_scene
 from vinl.robot.aliengo import CONTROL_DT

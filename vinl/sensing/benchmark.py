@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import torch
 import warp as wp
+from scipy.spatial.transform import Rotation
 
-from vinl.config.errors import InputError
 from vinl.robot.cameras import Camera
 from vinl.sensing.depth import DepthCamera, check_device
 from vinl.sensing.kernels import cast_rays
+from vinl.sensing.torch_warp import launch
 from vinl.world.boxes import Boxes
 from vinl.world.grid import GridFrame
 from vinl.world.mesh import box_mesh, floor_mesh, join_meshes
@@ -48,14 +49,10 @@ def run_depth(
         ``num_images``, ``width``, ``height``, ``homes``, ``triangles`` in all homes, ``device``, ``warp``.
 
     Raises:
-        InputError: a number is not positive, or the GPU is not there.
+        InputError: the GPU is not there.
     """
     chosen = check_device(device)
     num_images = (4096 if chosen.type == "cuda" else 32) if num_images is None else num_images
-    numbers = {"num_images": num_images, "width": width, "height": height, "seconds": seconds, "homes": homes}
-    for name, value in numbers.items():
-        if value <= 0:
-            raise InputError(f"bench depth: {name} must be positive, got {value}")
     rng = np.random.default_rng(0)
     meshes = [_draw_home(rng) for _ in range(homes)]
     record = Camera("navigation", (0.35, 0.0, 0.0), math.radians(-15), math.radians(70), width, height, 10.0)
@@ -79,16 +76,16 @@ def run_depth(
     }
 
 
-def _rate(launch: Callable[[], Any], device: torch.device, seconds: float) -> float:
+def _rate(work: Callable[[], Any], device: torch.device, seconds: float) -> float:
     """Launches a second, after three to warm up (the first compiles)."""
     wait = (lambda: torch.cuda.synchronize(device)) if device.type == "cuda" else (lambda: None)
     for _ in range(3):
-        launch()
+        work()
     wait()
     count, batch, start = 0, 20 if device.type == "cuda" else 1, time.perf_counter()
     while True:
         for _ in range(batch):
-            launch()
+            work()
         wait()
         count += batch
         passed = time.perf_counter() - start
@@ -120,12 +117,7 @@ def _bare_launch(
         record.far,
     ]
     outputs = [wp.from_torch(distance)]
-    stream = wp.stream_from_torch(torch.cuda.current_stream(device)) if device.type == "cuda" else None
-
-    def launch() -> None:
-        wp.launch(cast_rays, dim=len(distance), inputs=inputs, outputs=outputs, device=str(device), stream=stream)
-
-    return launch
+    return lambda: launch(cast_rays, len(distance), inputs, device, outputs)
 
 
 def _draw_home(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -178,18 +170,10 @@ def _draw_poses(
     room = np.column_stack([rng.integers(columns, size=n), rng.integers(rows, size=n)])
     xy = (room + 0.5) * size + rng.uniform(-0.5, 0.5, (n, 2)) * (size - 2.2)
     position = np.column_stack([xy, np.full(n, _HEIGHT)])
-    yaw, pitch, roll = rng.uniform(-math.pi, math.pi, n), rng.normal(0, 0.05, n), rng.normal(0, 0.05, n)
-    zero, one = np.zeros(n), np.ones(n)
-
-    def turn(rows_of: list) -> np.ndarray:
-        return np.stack([np.stack(row, -1) for row in rows_of], -2)
-
-    c, s = np.cos, np.sin
-    rz = turn([[c(yaw), -s(yaw), zero], [s(yaw), c(yaw), zero], [zero, zero, one]])
-    ry = turn([[c(pitch), zero, s(pitch)], [zero, one, zero], [-s(pitch), zero, c(pitch)]])
-    rx = turn([[one, zero, zero], [zero, c(roll), -s(roll)], [zero, s(roll), c(roll)]])
+    yaw_pitch_roll = np.stack([rng.uniform(-math.pi, math.pi, n), rng.normal(0, 0.05, n), rng.normal(0, 0.05, n)], 1)
+    turned = Rotation.from_euler("ZYX", yaw_pitch_roll).as_matrix()
     return (
         torch.as_tensor(rng.integers(homes, size=n), device=device),
         torch.as_tensor(position, dtype=torch.float32, device=device),
-        torch.as_tensor(rz @ ry @ rx, dtype=torch.float32, device=device),
+        torch.as_tensor(turned, dtype=torch.float32, device=device),
     )

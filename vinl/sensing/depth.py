@@ -12,7 +12,8 @@ from jaxtyping import Float
 
 from vinl.config.errors import InputError
 from vinl.robot.cameras import Camera
-from vinl.sensing.kernels import render_depth, render_depth_over_floor
+from vinl.sensing.kernels import render_depth
+from vinl.sensing.torch_warp import find_stream
 
 Mesh = tuple[np.ndarray, np.ndarray]
 """Vertices (v, 3) [m] and faces (f, 3)."""
@@ -82,7 +83,7 @@ class DepthCamera:
             raise InputError("a depth camera needs at least one mesh to look at")
         if dtype not in (torch.float16, torch.float32):
             raise InputError(f"depth is float32 or float16, not {dtype}")
-        self.camera, self._floor = camera, floor
+        self.camera, self._floor = camera, -np.inf if floor is None else floor
         self.device = check_device(device)
         self.dtype = dtype
         self._warp_device = str(self.device)
@@ -152,24 +153,16 @@ class DepthCamera:
 
     def launch(self, world: wp.array, position: wp.array, rotation: wp.array, out: wp.array, **options: Any) -> Any:
         """Launch the kernel on Warp's arrays as in ``render_poses``, unchecked; ``options`` of ``wp.launch``."""
-        over_floor = self._floor is not None
+        view = wp.vec2(*self.camera.tan_half), self.camera.far, self._floor
         return wp.launch(
-            render_depth_over_floor if over_floor else render_depth,
+            render_depth,
             dim=out.shape,
-            inputs=[
-                *(self.mesh_ids, world, position, rotation, wp.vec2(*self.camera.tan_half), self.camera.far),
-                *((self._floor,) if over_floor else ()),
-            ],
+            inputs=[self.mesh_ids, world, position, rotation, *view],
             outputs=[out],
             device=self._warp_device,
-            stream=self._stream(),
+            stream=find_stream(self.device),
             **options,
         )
-
-    def _stream(self) -> wp.Stream | None:
-        if self.device.type == "cpu":
-            return None
-        return wp.stream_from_torch(torch.cuda.current_stream(self.device))
 
     def _on_device(self, values: Any) -> torch.Tensor:
         return torch.as_tensor(values, dtype=torch.float32, device=self.device).detach()

@@ -32,32 +32,11 @@ def render_depth(
     rotation: wp.array(dtype=wp.mat33),
     tan_half: wp.vec2,
     far: wp.float32,
-    depth: wp.array(dtype=Any, ndim=3),
-):
-    """One thread a pixel."""
-    image, row, column = wp.tid()
-    direction = rotation[image] * look_through(row, column, depth.shape[1], depth.shape[2], tan_half)
-    t = far
-    hit = wp.mesh_query_ray(meshes[world[image]], position[image], direction, far)
-    if hit.result:
-        t = hit.t
-    depth[image, row, column] = depth.dtype(t)
-
-
-@wp.kernel
-@no_type_check
-def render_depth_over_floor(
-    meshes: wp.array(dtype=wp.uint64),
-    world: wp.array(dtype=wp.int32),
-    position: wp.array(dtype=wp.vec3),
-    rotation: wp.array(dtype=wp.mat33),
-    tan_half: wp.vec2,
-    far: wp.float32,
     floor: wp.float32,
     depth: wp.array(dtype=Any, ndim=3),
 ):
-    """As ``render_depth``, with a level floor that is not in the meshes: where it is hit follows from one division, and
-    nothing behind it is looked for."""
+    """One thread a pixel. The level floor is not in the meshes: where it is hit follows from one division, and nothing
+    behind it is looked for; minus infinity: there is none."""
     image, row, column = wp.tid()
     direction = rotation[image] * look_through(row, column, depth.shape[1], depth.shape[2], tan_half)
     start = position[image]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import torch
 import warp as wp
 from jaxtyping import Bool, Float, Int
@@ -11,6 +9,7 @@ from torch import Tensor
 
 from vinl.sensing.sensor_config import OdometryConfig
 from vinl.sensing.sensor_kernels import draw_uniform
+from vinl.sensing.torch_warp import launch
 
 
 class Odometry:
@@ -34,9 +33,8 @@ class Odometry:
 
     def restart(self, key: Int[Tensor, " n"], chosen: Bool[Tensor, " n"], position: Float[Tensor, "n 2"]) -> None:
         """Begin at known places; the errors follow from each robot's key alone."""
-        stream = wp.stream_from_torch(torch.cuda.current_stream(self._device)) if self._device.type == "cuda" else None
-        arrays: list[Any] = [wp.from_torch(key), wp.from_torch(self._drawn)]
-        wp.launch(draw_uniform, dim=self._drawn.shape, inputs=arrays, device=str(self._device), stream=stream)
+        arrays = [wp.from_torch(key), wp.from_torch(self._drawn)]
+        launch(draw_uniform, self._drawn.shape, arrays, self._device)
         low, high = self.config.drift
         drift = low + (high - low) * self._drawn[:, 0]
         factor = 1.0 + torch.where(self._drawn[:, 1] < 0.5, -drift, drift)

@@ -12,7 +12,7 @@ from torch import Tensor
 from vinl.robot.cameras import Camera
 from vinl.sensing.sensor_config import SensorConfig
 from vinl.sensing.sensor_kernels import PATCHES, Cameras, SensorRules, draw_cameras, draw_patches, spoil_depth
-from vinl.sensing.structs import allocate_struct, fill_struct
+from vinl.sensing.torch_warp import allocate_struct, fill_struct, launch
 
 
 def mount_errors(xp: Any, roll: Any, pitch: Any) -> Any:
@@ -55,7 +55,7 @@ class DepthSensor:
         """Draw the chosen cameras anew, each from its key alone."""
         if not self.config.is_ideal:
             inputs = [self._rules, wp.from_torch(key), wp.from_torch(chosen), self.cameras]
-            self._launch(draw_cameras, len(key), inputs)
+            launch(draw_cameras, len(key), inputs, self._device)
 
     def spoil(
         self,
@@ -86,7 +86,7 @@ class DepthSensor:
         if self.config.patches > 0:
             aspect = self._camera.height / self._camera.width
             drawn = [self._rules, self.cameras, wp.from_torch(rows), wp.from_torch(key), aspect, patches]
-            self._launch(draw_patches, shape, drawn)
+            launch(draw_patches, shape, drawn, self._device)
         inputs = [
             self._rules,
             self.cameras,
@@ -102,10 +102,5 @@ class DepthSensor:
             wp.from_torch(images.contiguous()),
             wp.from_torch(spoilt),
         ]
-        self._launch(spoil_depth, tuple(images.shape), inputs)
+        launch(spoil_depth, images.shape, inputs, self._device)
         return spoilt
-
-    def _launch(self, kernel: Any, dim: int | tuple[int, ...], inputs: list[Any]) -> None:
-        on_gpu = self._device.type == "cuda"
-        stream = wp.stream_from_torch(torch.cuda.current_stream(self._device)) if on_gpu else None
-        wp.launch(kernel, dim=dim, inputs=inputs, device=str(self._device), stream=stream)

@@ -36,11 +36,7 @@ from vinl.world.clutter import CLUTTER
 FORWARD, TURN = (-0.3, 1.0), 60.0
 """Commands that the sliders reach: forward [m/s], and to both sides [deg/s]."""
 
-CLICKS: dict[str, Callable[[float, float], Request]] = {
-    "goal": SetGoal,
-    "block": ToggleBlock,
-    "robot": PlaceRobot,
-}
+CLICKS: dict[str, Callable[[float, float], Request]] = {"goal": SetGoal, "block": ToggleBlock, "robot": PlaceRobot}
 """What a click on the floor asks for."""
 
 CLICK_TEXTS = {"sets the goal": "goal", "puts down or takes away a block": "block", "puts the robot there": "robot"}
@@ -88,11 +84,9 @@ class Controls:
     def follow(self, snapshot: Snapshot) -> None:
         """Show what the session did by itself: pauses, commands of the navigator."""
         self._paused = snapshot.paused
-        if snapshot.state in ("walking", "reached", "fallen") and self._driven():
+        driven = bool(self._forward.value or self._turn.value)
+        if snapshot.state in ("walking", "reached", "fallen") and driven:
             self._forward.value, self._turn.value = 0.0, 0.0
-
-    def _driven(self) -> bool:
-        return bool(self._forward.value or self._turn.value)
 
     def _add_time(self) -> None:
         actions: dict[str, Callable[[], Request]] = {

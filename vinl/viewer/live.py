@@ -6,7 +6,6 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -14,12 +13,11 @@ from jaxtyping import Float
 from vinl.chain.choose import check_cameras, choose_locomotor, load_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.controller import open_controller
-from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
+from vinl.chain.depth_cameras import CameraErrors, DepthCameras, RealCameras, open_depth_cameras
 from vinl.chain.navigators.base import Navigator, Task, decide
 from vinl.chain.navigators.learned import DeadReckoning
-from vinl.chain.real_cameras import CameraErrors, RealCameras
-from vinl.chain.robot import KINDS, FaultyState, Robot, change_body
-from vinl.chain.scene import FORCE_SENSORS, build_scene
+from vinl.chain.robot import KINDS, FaultyState, Robot, build_model
+from vinl.chain.scene import FORCE_SENSORS
 from vinl.config.errors import InputError
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, FOOT_GEOMS
@@ -55,14 +53,11 @@ _PATH_EVERY = 5
 _LIMBS = ("foot", "leg", "trunk")
 
 
-@runtime_checkable
-class TellsFootholds(Protocol):
-    """A policy or navigator that knows where the feet are to come down."""
-
-    def footholds(self) -> dict[str, Float[np.ndarray, "n 4 3"]]:
-        """``planned`` and ``predicted`` footholds, as far as there are such, in the heading frames that the robots had
-        when they were last asked [m]: the origin in the middle of the trunk, x along its heading, z up."""
-        ...
+def look_through(
+    cameras: Mapping[str, DepthCameras | RealCameras], qpos: Float[np.ndarray, "1 19"]
+) -> dict[str, DepthImage]:
+    """What one robot's cameras see, by name."""
+    return {name: DepthImage(one.camera, one.look(qpos)[0].numpy().copy()) for name, one in cameras.items()}
 
 
 class LiveChain:
@@ -121,7 +116,8 @@ class LiveChain:
             case PlaceRobot(x, y):
                 self._place(np.array([x, y]))
             case ToggleBlock(x, y):
-                self._toggle_block(np.array([x, y]))
+                xy, world = np.array([x, y]), self.world
+                self._rebuild(world.without_block(xy) or world.with_block(draw_block(xy, self._rng), self._xy))
             case ScatterClutter(preset):
                 self._rebuild(self.world.scattered(preset, self._rng, self._xy))
                 return f"{len(self.world.blocks)} blocks"
@@ -166,10 +162,7 @@ class LiveChain:
         """The present moment. ``look``: render depth images anew."""
         if look or not self._images:
             qpos = self._walker.qpos[None]
-            self._images = {
-                name: DepthImage(camera.camera, camera.look(qpos)[0].numpy().copy())
-                for name, camera in self._cameras.items()
-            }
+            self._images = look_through(self._cameras, qpos)
         data = self._walker.data
         return Snapshot(
             world=self.world,
@@ -295,11 +288,8 @@ class LiveChain:
 
     def _build(self, world: World) -> None:
         """Physics, height scan and cameras of a world."""
-        kp, kd = (float(self._locomotion.card.action[key]) for key in ("kp", "kd"))
         faults, blocks, ceiling = self._config.faults, [world.blocks], self._config.ceiling
-        boxes = (world.plan.boxes, world.blocks.boxes())
-        model = build_scene(*boxes, kp=kp * faults.kp_scale, kd=kd * faults.kd_scale)
-        change_body(model, faults)
+        model = build_model(world.plan.boxes, world.blocks.boxes(), self._locomotion.card, faults)
         self._walker = Robot(model, faults.delay_steps)
         self._controller = open_controller(self._locomotion, world.plan, blocks, ceiling, self._errors)
         ideal = {
@@ -324,9 +314,6 @@ class LiveChain:
         self._controller.take_over(controller)
         self._walker.take_over(walker)
         self._images, self._footholds = {}, Footholds()
-
-    def _toggle_block(self, xy: Float[np.ndarray, "2"]) -> None:
-        self._rebuild(self.world.without_block(xy) or self.world.with_block(draw_block(xy, self._rng), self._xy))
 
     # ---- the policies ----------------------------------------------------------------------------------------------
 
@@ -357,11 +344,10 @@ class LiveChain:
 
     def _read_footholds(self) -> Footholds:
         """What the policies tell of their footholds, in the world frame; before the robot moves on."""
-        found: dict[str, np.ndarray] = {}
-        for one in (self._controller, self._locomotion):
-            if isinstance(one, TellsFootholds):
-                found.update({name: self._in_world(points[0]) for name, points in one.footholds().items()})
-        return Footholds(found.get("planned"), found.get("predicted"))
+        tell = getattr(self._locomotion, "footholds", dict[str, np.ndarray])  # policies may have such a method
+        found = self._controller.footholds() | tell()
+        places = {name: self._in_world(points[0]) for name, points in found.items()}
+        return Footholds(places.get("planned"), places.get("predicted"))
 
     def _in_world(self, points: Float[np.ndarray, "4 3"]) -> Float[np.ndarray, "4 3"]:
         c, s = np.cos(self._yaw), np.sin(self._yaw)

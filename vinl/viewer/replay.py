@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
-
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from vinl.benchmark.journal import Recordings
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
-from vinl.chain.records import Episode
 from vinl.chain.robot import KINDS
 from vinl.config.errors import InputError
 from vinl.render.video import POSE_DT
@@ -18,32 +15,16 @@ from vinl.robot.aliengo import FOOT_GEOMS
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
 from vinl.robot.model import robot_spec
 from vinl.robot.rotation import wrap_angle, yaw_of
-from vinl.viewer.live import CONTACT_MEMORY
+from vinl.viewer.live import CONTACT_MEMORY, look_through
 from vinl.viewer.session import DepthImage, OpenEpisode, Request, Reset, Seek, Snapshot
 from vinl.viewer.world import World
 from vinl.world.boxes import Blocks
-from vinl.world.floorplan import FloorPlan
 
 _CONTACT_HEIGHT = 0.06
 """Recordings keep where contacts were from above only; they are drawn at this height [m]."""
 
 _PATH_EVERY = 2
 _LIMBS = ("foot", "leg", "trunk")
-
-
-@runtime_checkable
-class Shelf(Protocol):
-    """Recorded episodes to choose from.
-
-    Attributes:
-        labels: one for each of them.
-    """
-
-    labels: Sequence[str]
-
-    def open(self, number: int) -> tuple[FloorPlan, Episode]:
-        """An episode with its poses, and its floor plan."""
-        ...
 
 
 class Replay:
@@ -60,7 +41,7 @@ class Replay:
     dt = POSE_DT
     """Time between two recorded poses [s]."""
 
-    def __init__(self, shelf: Shelf, number: int = 0) -> None:
+    def __init__(self, shelf: Recordings, number: int = 0) -> None:
         self._shelf = shelf
         self._model = robot_spec("primitives").compile()
         self._data = mujoco.MjData(self._model)
@@ -91,10 +72,7 @@ class Replay:
         k, qpos = self._frame, self._poses[self._frame]
         time = k * POSE_DT
         if look or not self._images:
-            self._images = {
-                name: DepthImage(camera.camera, camera.look(qpos[None])[0].numpy().copy())
-                for name, camera in self._cameras.items()
-            }
+            self._images = look_through(self._cameras, qpos[None])
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self._model, self._data)
         record, trace = self._episode.record, self._episode.trace

@@ -17,6 +17,7 @@ from vinl.viewer.session import Footholds, Snapshot
 from vinl.viewer.world import World
 from vinl.world.floorplan import FloorPlan
 from vinl.world.mesh import box_mesh
+from vinl.world.raster import split_rectangles
 
 TILE = 0.5
 """Distance between the lines on the floor [m]."""
@@ -28,26 +29,13 @@ def list_runs(row: Bool[np.ndarray, " columns"]) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-def cover_cells(cells: Bool[np.ndarray, "rows columns"]) -> Int[np.ndarray, "n 4"]:
-    """Rectangles (first row, first column, rows end, columns end) that cover the true cells, none of them twice."""
-    open_: dict[tuple[int, int], int] = {}
-    found = []
-    for i in range(len(cells) + 1):
-        runs = set(list_runs(cells[i])) if i < len(cells) else set()
-        ended = [run for run in open_ if run not in runs]
-        found += [[open_.pop(run), run[0], i, run[1]] for run in ended]
-        for run in runs:
-            open_.setdefault(run, i)
-    return np.array(sorted(found), int).reshape(-1, 4)
-
-
 def inside_mesh(plan: FloorPlan) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "f 3"]]:
     """The floor inside the building at z = 0, seen from above.
 
     Returns:
-        vertices (v, 3) float32 [m] and faces (f, 3).
+        vertices (v, 3) float32 [m] and faces (f, 3); some lie on one another.
     """
-    rectangles, half = cover_cells(plan.inside), plan.frame.resolution / 2
+    rectangles, half = split_rectangles(plan.inside), plan.frame.resolution / 2
     low, high = plan.frame.xy(rectangles[:, :2]) - half, plan.frame.xy(rectangles[:, 2:]) - half
     corners = np.stack([low, np.stack([high[:, 0], low[:, 1]], 1), high, np.stack([low[:, 0], high[:, 1]], 1)], 1)
     vertices = np.concatenate([corners, np.zeros((len(corners), 4, 1))], 2).reshape(-1, 3)

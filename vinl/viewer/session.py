@@ -23,32 +23,36 @@ from vinl.robot.cameras import Camera
 from vinl.viewer.world import World
 
 
+class Request:
+    """Something that a session is asked for."""
+
+
 @dataclass(frozen=True)
-class Pause:
+class Pause(Request):
     """Stop time, or let it go on."""
 
     paused: bool
 
 
 @dataclass(frozen=True)
-class StepOnce:
+class StepOnce(Request):
     """One step of the source (20 ms when live), then pause."""
 
 
 @dataclass(frozen=True)
-class SetPace:
+class SetPace(Request):
     """How fast time goes: 1 is real time, 0.1 a tenth of it."""
 
     pace: float
 
 
 @dataclass(frozen=True)
-class Reset:
+class Reset(Request):
     """Put the robot back to where it was last put down."""
 
 
 @dataclass(frozen=True)
-class SetGoal:
+class SetGoal(Request):
     """Walk to a point [m] with the navigator."""
 
     x: float
@@ -56,7 +60,7 @@ class SetGoal:
 
 
 @dataclass(frozen=True)
-class Drive:
+class Drive(Request):
     """Walk with this command: forward [m/s], yaw rate [rad/s], left positive. Ends a walk to a goal."""
 
     forward: float
@@ -64,7 +68,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Push:
+class Push(Request):
     """Change the trunk's velocity at once by so much [m/s], towards an angle from its heading [rad]."""
 
     speed: float
@@ -72,7 +76,7 @@ class Push:
 
 
 @dataclass(frozen=True)
-class PlaceRobot:
+class PlaceRobot(Request):
     """Put the robot down at x, y [m], with its heading."""
 
     x: float
@@ -80,7 +84,7 @@ class PlaceRobot:
 
 
 @dataclass(frozen=True)
-class ToggleBlock:
+class ToggleBlock(Request):
     """Take away the block at a point [m]; where there is none, put one down."""
 
     x: float
@@ -88,14 +92,14 @@ class ToggleBlock:
 
 
 @dataclass(frozen=True)
-class ScatterClutter:
+class ScatterClutter(Request):
     """Draw the clutter anew from a preset; ``none`` clears the floor."""
 
     preset: str
 
 
 @dataclass(frozen=True)
-class ChangePolicies:
+class ChangePolicies(Request):
     """Other policies, or their names or folders; None keeps the one there is."""
 
     locomotion: str | Path | Policy | None = None
@@ -103,43 +107,24 @@ class ChangePolicies:
 
 
 @dataclass(frozen=True)
-class OpenPlan:
+class OpenPlan(Request):
     """Another floor plan, by name or file."""
 
     plan: str
 
 
 @dataclass(frozen=True)
-class Seek:
+class Seek(Request):
     """Go to a time of a recording [s]."""
 
     time: float
 
 
 @dataclass(frozen=True)
-class OpenEpisode:
+class OpenEpisode(Request):
     """Show another episode of the folder."""
 
     number: int
-
-
-Request = (
-    Pause
-    | StepOnce
-    | SetPace
-    | Reset
-    | SetGoal
-    | Drive
-    | Push
-    | PlaceRobot
-    | ToggleBlock
-    | ScatterClutter
-    | ChangePolicies
-    | OpenPlan
-    | Seek
-    | OpenEpisode
-)
-"""Any of them."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -91,13 +91,13 @@ class Boxes(_Table):
 
     def contain(self, points: Float[np.ndarray, "k 2"]) -> Bool[np.ndarray, "n k"]:
         """Which box's footprint holds which point (edges included)."""
-        return self._beyond(points).max(-1) <= 1e-9
+        return self.beyond(points).max(-1) <= 1e-9
 
     def distances(self, points: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "n k"]:
         """From each box's footprint to each point [m]; zero inside."""
-        return np.hypot(*np.moveaxis(np.maximum(self._beyond(points), 0.0), -1, 0))
+        return np.hypot(*np.moveaxis(np.maximum(self.beyond(points), 0.0), -1, 0))
 
-    def _beyond(self, points: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "n k 2"]:
+    def beyond(self, points: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "n k 2"]:
         """How far points lie beyond the footprints' sides, along each box's own axes [m]; negative inside."""
         d = np.asarray(points)[None] - self.rows[:, None, :2]
         c, s = np.cos(self.rows[:, 2, None]), np.sin(self.rows[:, 2, None])

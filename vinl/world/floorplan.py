@@ -152,10 +152,7 @@ def assemble_floorplan(
     free = inside & ~paint_boxes((walls + furniture).below(BODY_HEIGHT), frame)
     if not free.any():
         raise InputError(f"{source}: walls and furniture cover the whole plan; check which pixels are walls")
-    if roomy:
-        return FloorPlan(name, source, walls, furniture, inside, free, frame, windows or Boxes.empty(), labels)
-    widest = 2 * float(measure_clearance(free, frame.resolution).max())
-    if widest < 2 * ROOM_TO_STAND:
+    if not roomy and (widest := 2 * float(measure_clearance(free, frame.resolution).max())) < 2 * ROOM_TO_STAND:
         raise InputError(
             f"{source}: the plan is too small for the robot: its widest free spot is {widest:.2f} m, the robot needs "
             f"{2 * ROOM_TO_STAND:.2f} m; check the scale (metres per pixel)"

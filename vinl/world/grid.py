@@ -3,6 +3,7 @@ Rows run along y, columns along x, the origin is the lower left cell."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,16 +101,23 @@ def raise_boxes(field: HeightField, boxes: Boxes, label: int) -> None:
         boxes: what to write.
         label: ``BLOCK`` or ``WALL``.
     """
-    xs, ys = field.frame.centres()
-    reach = np.hypot(boxes.rows[:, 3], boxes.rows[:, 4]) / 2 + field.frame.resolution
+    for top, near, beyond in _look_around(field.frame, boxes, field.frame.resolution):
+        inside, heights, labels = beyond.max(-1) <= 1e-9, field.heights[near], field.labels[near]
+        heights[inside] = np.maximum(heights[inside], top)
+        labels[inside] = np.maximum(labels[inside], label)
+
+
+def _look_around(
+    frame: GridFrame, boxes: Boxes, margin: float
+) -> Iterator[tuple[float, tuple[slice, slice], np.ndarray]]:
+    """For every box its top [m], the cells within a margin [m] of it, and how far these lie beyond its sides [m]."""
+    xs, ys = frame.centres()
+    reach = np.hypot(boxes.rows[:, 3], boxes.rows[:, 4]) / 2 + margin
     for row, r in zip(boxes.rows, reach, strict=True):
         j = slice(*np.searchsorted(xs, [row[0] - r, row[0] + r]))
         i = slice(*np.searchsorted(ys, [row[1] - r, row[1] + r]))
-        grid = np.stack(np.meshgrid(xs[j], ys[i]), -1)
-        inside = Boxes(row[None]).contain(grid.reshape(-1, 2)).reshape(grid.shape[:2])
-        heights, labels = field.heights[i, j], field.labels[i, j]
-        heights[inside] = np.maximum(heights[inside], row[6])
-        labels[inside] = np.maximum(labels[inside], label)
+        points = np.stack(np.meshgrid(xs[j], ys[i]), -1)
+        yield row[6], (i, j), Boxes(row[None]).beyond(points.reshape(-1, 2)).reshape(points.shape)
 
 
 FAR = 0.25
@@ -130,18 +138,11 @@ def block_distances(
         (0 where none is near).
     """
     distance, top = np.full(frame.shape, FAR, np.float32), np.zeros(frame.shape, np.float32)
-    xs, ys = frame.centres()
-    reach = np.hypot(boxes.rows[:, 3], boxes.rows[:, 4]) / 2 + FAR
-    for (x, y, yaw, length, width, _, high), r in zip(boxes.rows, reach, strict=True):
-        j = slice(*np.searchsorted(xs, [x - r, x + r]))
-        i = slice(*np.searchsorted(ys, [y - r, y + r]))
-        gx, gy = np.meshgrid(xs[j] - x, ys[i] - y)
-        u = np.abs(np.cos(yaw) * gx + np.sin(yaw) * gy) - length / 2
-        v = np.abs(-np.sin(yaw) * gx + np.cos(yaw) * gy) - width / 2
-        d = np.hypot(np.maximum(u, 0), np.maximum(v, 0)) + np.minimum(np.maximum(u, v), 0)
-        nearer = d < distance[i, j]
-        distance[i, j] = np.where(nearer, d, distance[i, j])
-        top[i, j] = np.where(nearer, high, top[i, j])
+    for high, near, beyond in _look_around(frame, boxes, FAR):
+        d = np.hypot(*np.moveaxis(np.maximum(beyond, 0), -1, 0)) + np.minimum(beyond.max(-1), 0)
+        nearer = d < distance[near]
+        distance[near] = np.where(nearer, d, distance[near])
+        top[near] = np.where(nearer, high, top[near])
     return distance, top
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -361,38 +360,36 @@ def build_terrain(config: TerrainConfig) -> Terrain:
             middle = frame.xy(np.array([i, j])) + TILE / 2
             shift = np.array([*middle, 0, 0, 0, 0, 0])
             starts[k, c, :2] = middle
-            tiles: dict[str, Callable[[], np.ndarray]] = {
-                "slope": lambda d=difficulty, up=up: slope_tile(d, up),
-                "rough_slope": lambda d=difficulty, up=up, rng=rng: rough_slope_tile(d, up, rng),
-                "stairs_up": lambda d=difficulty: stairs_tile(d, up=False),
-                "stairs_down": lambda d=difficulty: stairs_tile(d, up=True),
-                "discrete": lambda d=difficulty, rng=rng: discrete_tile(d, rng),
-            }
-            if kind in tiles:
-                ground.heights[i : i + CELLS, j : j + CELLS] = tiles[kind]()
-                continue
-            none = np.zeros((0, 2))
-            if kind in ("hurdles", "bars"):
-                if k > 0:
-                    draw = draw_hurdles if kind == "hurdles" else draw_bars
-                    drawn = draw(rng, TILE, config.start_clear, config.heights_at(k), config.depth_at(k)).rows
-                    blocks.append(Blocks(drawn + shift[:6]))
-            elif kind == "rooms":
-                tall.append(Boxes(draw_rooms(rng, TILE, difficulty).rows + shift))
-                if config.wall_blocks > 0:
+            tile, none = ground.heights[i : i + CELLS, j : j + CELLS], np.zeros((0, 2))
+            match kind:
+                case "slope":
+                    tile[:] = slope_tile(difficulty, up)
+                case "rough_slope":
+                    tile[:] = rough_slope_tile(difficulty, up, rng)
+                case "stairs_up" | "stairs_down":
+                    tile[:] = stairs_tile(difficulty, up=kind == "stairs_down")
+                case "discrete":
+                    tile[:] = discrete_tile(difficulty, rng)
+                case "hurdles" | "bars":
+                    if k > 0:
+                        draw = draw_hurdles if kind == "hurdles" else draw_bars
+                        drawn = draw(rng, TILE, config.start_clear, config.heights_at(k), config.depth_at(k)).rows
+                        blocks.append(Blocks(drawn + shift[:6]))
+                case "rooms":
+                    tall.append(Boxes(draw_rooms(rng, TILE, difficulty).rows + shift))
                     blocks.append(_tile_blocks(config, rng, k, middle, none, config.wall_blocks))
-            elif kind == "walls":
-                count = round(difficulty * 0.15 * TILE**2)
-                here = scatter_centres(rng, count, TILE / 2 - 0.3, 1.0, 1.2, none)
-                boxes = [draw_tall(rng, here[::2], long=True), draw_tall(rng, here[1::2], long=False)]
-                # a wall is long: those that would reach into the start are left out
-                tall += [Boxes(b.rows + shift) for b in map(_off_the_start, boxes)]
-                if config.wall_blocks > 0:
+                case "walls":
+                    count = round(difficulty * 0.15 * TILE**2)
+                    here = scatter_centres(rng, count, TILE / 2 - 0.3, 1.0, 1.2, none)
+                    boxes = [draw_tall(rng, here[::2], long=True), draw_tall(rng, here[1::2], long=False)]
+                    # a wall is long: those nearer than 1.3 m to the middle, where robots start, are left out
+                    far = [b.rows[b.distances(_START)[:, 0] > 1.3] for b in boxes]
+                    tall += [Boxes(rows + shift) for rows in far]
                     blocks.append(_tile_blocks(config, rng, k, middle, here, config.wall_blocks))
-            else:
-                here = scatter_centres(rng, round(config.tall_density * TILE**2) if k else 0, 3.7, 1.5, 1.5, none)
-                tall.append(Boxes(draw_tall(rng, here, long=False).rows + shift))
-                blocks.append(_tile_blocks(config, rng, k, middle, here))
+                case _:
+                    here = scatter_centres(rng, round(config.tall_density * TILE**2) if k else 0, 3.7, 1.5, 1.5, none)
+                    tall.append(Boxes(draw_tall(rng, here, long=False).rows + shift))
+                    blocks.append(_tile_blocks(config, rng, k, middle, here))
     all_blocks, all_tall = sum(blocks, Blocks.empty()), sum(tall, Boxes.empty())
     raise_boxes(ground, all_blocks.boxes(), BLOCK)
     raise_boxes(ground, all_tall, WALL)
@@ -419,8 +416,3 @@ def _tile_blocks(
     centres = scatter_centres(rng, round(wanted), TILE / 2, clear, 0.45, taken)
     blocks = draw_blocks(rng, centres, config.heights_at(level), min(config.depth_at(level), 0.2))
     return Blocks(blocks.rows + np.array([*middle, 0, 0, 0, 0]))
-
-
-def _off_the_start(boxes: Boxes) -> Boxes:
-    """The boxes of a tile that a robot can start beside: they leave a disc of 1.3 m around its middle free."""
-    return Boxes(boxes.rows[boxes.distances(_START)[:, 0] > 1.3])

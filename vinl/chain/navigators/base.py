@@ -83,7 +83,7 @@ def decide(
         depth: (n, height, width) what its camera sees [m].
 
     Raises:
-        InputError: what it answers is no answer.
+        InputError: what it answers has another shape than (n, 2), or numbers that are not finite.
     """
     believed = pose if believed is None else believed
     seen: dict[str, Any] = {
@@ -94,19 +94,10 @@ def decide(
     }
     if depth is not None:
         seen["depth"] = depth
-    return check_choice(navigator.act(seen), len(pose), navigator)
-
-
-def check_choice(choice: Any, n: int, navigator: Navigator) -> Float[np.ndarray, "n 2"]:
-    """What a navigator answered, if it makes sense.
-
-    Raises:
-        InputError: another shape than (n, 2), or numbers that are not finite.
-    """
-    found = np.asarray(choice, dtype=np.float64)
+    choice = np.asarray(navigator.act(seen), dtype=np.float64)
     name = getattr(navigator, "name", type(navigator).__name__)
-    if found.shape != (n, 2):
-        raise InputError(f"navigator {name} must return speeds and yaw rates of shape ({n}, 2), got {found.shape}")
-    if not np.isfinite(found).all():
+    if choice.shape != (n := len(pose), 2):
+        raise InputError(f"navigator {name} must return speeds and yaw rates of shape ({n}, 2), got {choice.shape}")
+    if not np.isfinite(choice).all():
         raise InputError(f"navigator {name} returned numbers that are not finite (NaN or infinite)")
-    return found
+    return choice

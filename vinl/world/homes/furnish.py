@@ -36,16 +36,8 @@ TABLE: dict[str, list[Wish]] = {
         (make.single_bed, 0.3, "corner"),
         (make.stand, 0.6, "floor"),
     ],
-    "dining": [
-        (make.dining_table, 1.0, "centre"),
-        (make.chest, 0.8, "wall"),
-        (make.shelf, 0.4, "wall"),
-    ],
-    "bath": [
-        (make.toilet, 0.95, "wall"),
-        (make.basin, 0.95, "wall"),
-        (make.washer, 0.4, "corner"),
-    ],
+    "dining": [(make.dining_table, 1.0, "centre"), (make.chest, 0.8, "wall"), (make.shelf, 0.4, "wall")],
+    "bath": [(make.toilet, 0.95, "wall"), (make.basin, 0.95, "wall"), (make.washer, 0.4, "corner")],
     "wc": [(make.toilet, 1.0, "middle"), (make.basin, 0.8, "wall")],
     "store": [
         (make.shelf, 0.9, "wall"),
@@ -60,11 +52,7 @@ TABLE: dict[str, list[Wish]] = {
         (make.armchair, 0.4, "corner"),
         (make.table_for_two, 0.2, "centre"),
     ],
-    "bureau": [
-        (make.shelf, 0.9, "wall"),
-        (make.shelf, 0.4, "wall"),
-        (make.table_for_two, 0.2, "centre"),
-    ],
+    "bureau": [(make.shelf, 0.9, "wall"), (make.shelf, 0.4, "wall"), (make.table_for_two, 0.2, "centre")],
     "meeting": [(make.dining_table, 1.0, "centre"), (make.chest, 0.6, "wall"), (make.shelf, 0.3, "wall")],
     "hall": [(make.shoe_rack, 0.7, "wall"), (make.shoe_rack, 0.3, "wall")],
     "living": [
@@ -192,22 +180,17 @@ def _find_floor(shell: Shell, room: int) -> Floor:
     faces: list[Face] = []
     keep = shell.outer / 2
     rects = []
-    for x0, y0, x1, y1 in shell.rooms[room].rects:
-        sides = [x0, y0, x1, y1]
+    for rect in shell.rooms[room].rects:
+        sides = list(rect)
         for edge in shell.edges:
-            if room not in edge.rooms:
+            across, along = (0, 1) if edge.upright else (1, 0)
+            if room not in edge.rooms or edge.low >= rect[along + 2] or edge.high <= rect[along]:
                 continue
             half = (shell.outer if min(edge.rooms) < 0 else shell.inner) / 2
-            if edge.upright:
-                if edge.at == x0 and edge.rooms[1] == room and edge.low < y1 and edge.high > y0:
-                    sides[0] = max(sides[0], x0 + half)
-                if edge.at == x1 and edge.rooms[0] == room and edge.low < y1 and edge.high > y0:
-                    sides[2] = min(sides[2], x1 - half)
-            else:
-                if edge.at == y0 and edge.rooms[1] == room and edge.low < x1 and edge.high > x0:
-                    sides[1] = max(sides[1], y0 + half)
-                if edge.at == y1 and edge.rooms[0] == room and edge.low < x1 and edge.high > x0:
-                    sides[3] = min(sides[3], y1 - half)
+            if edge.at == rect[across] and edge.rooms[1] == room:
+                sides[across] = max(sides[across], edge.at + half)
+            if edge.at == rect[across + 2] and edge.rooms[0] == room:
+                sides[across + 2] = min(sides[across + 2], edge.at - half)
         rects.append((sides[0], sides[1], sides[2], sides[3]))
     for edge in shell.edges:
         if room not in edge.rooms:

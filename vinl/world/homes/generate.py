@@ -69,14 +69,9 @@ def keep_connected(
         free = floor.copy()
         for k in kept:
             free.flat[cells[k]] = False
-        fits = measure_clearance(free, frame.resolution) >= CHECKED_RADIUS
-        regions = label_regions(fits)
-        if not regions.any():
+        regions, sizes, main, reached = _find_reached(free, frame, windows, owners)
+        if not main:
             return None
-        sizes = np.bincount(regions.ravel())
-        sizes[0] = 0
-        main = int(sizes.argmax())
-        reached = {owner for owner, where in zip(owners, windows, strict=True) if (regions[where] == main).any()}
         lost = set(range(len(rooms))) - reached
         bad = {int(k) for k in np.flatnonzero(sizes * frame.resolution**2 >= POCKET)} - {main}
         gone: set[int] = set()
@@ -92,7 +87,7 @@ def keep_connected(
         if not gone:
             return None if lost else [pieces[k] for k in sorted(kept)]
         kept -= gone
-    return [] if _joined(floor, frame, windows, owners) else None
+    return [] if _find_reached(floor, frame, windows, owners)[3] == set(owners) else None
 
 
 def paint_rects(rects: list[Rect], frame: GridFrame) -> Bool[np.ndarray, "rows columns"]:
@@ -138,12 +133,16 @@ def _blame(regions: np.ndarray, main: int, bad: set[int], cells: list, kept: set
     return gone
 
 
-def _joined(floor: np.ndarray, frame: GridFrame, windows: list[tuple[slice, slice]], owners: list[int]) -> bool:
-    regions = label_regions(measure_clearance(floor, frame.resolution) >= CHECKED_RADIUS)
-    if not regions.any():
-        return False
-    main = int(np.bincount(regions.ravel())[1:].argmax()) + 1
-    return {o for o, where in zip(owners, windows, strict=True) if (regions[where] == main).any()} == set(owners)
+def _find_reached(
+    free: np.ndarray, frame: GridFrame, windows: list[tuple[slice, slice]], owners: list[int]
+) -> tuple[np.ndarray, np.ndarray, int, set[int]]:
+    """The regions that a robot can walk in, their sizes, the largest of them (0: none), and the rooms in it."""
+    regions = label_regions(measure_clearance(free, frame.resolution) >= CHECKED_RADIUS)
+    sizes = np.bincount(regions.ravel())
+    sizes[0] = 0
+    main = int(sizes.argmax())
+    rooms = {k for k, where in zip(owners, windows, strict=True) if main and (regions[where] == main).any()}
+    return regions, sizes, main, rooms
 
 
 ATTEMPTS = 100
@@ -189,7 +188,8 @@ def generate_home(seed: int, config: HomeConfig | None = None, resolution: float
             inside = paint_rects(rects, frame)
         furniture = Boxes(np.array([row for piece in pieces for row in piece.rows]).reshape(-1, 7))
         panes = Boxes(np.array(shell.panes).reshape(-1, 7))
-        labels = tuple(_label(room) for room in shell.rooms)
+        middles = [(room.kind, max(room.rects, key=measure)) for room in shell.rooms]
+        labels = tuple(RoomLabel(kind, (x0 + x1) / 2, (y0 + y1) / 2) for kind, (x0, y0, x1, y1) in middles)
         return assemble_floorplan(name, f"generated:{seed}", walls, furniture, inside, frame, panes, labels, roomy=True)
     raise InputError(IMPOSSIBLE)
 
@@ -208,11 +208,6 @@ def draw_shell(rng: Random, config: HomeConfig) -> Shell:
         if shell is not None:
             return shell
     raise InputError(IMPOSSIBLE)
-
-
-def _label(room: Room) -> RoomLabel:
-    x0, y0, x1, y1 = max(room.rects, key=measure)
-    return RoomLabel(room.kind, (x0 + x1) / 2, (y0 + y1) / 2)
 
 
 RESERVED_FROM = 1_000_000_000
@@ -239,10 +234,7 @@ class JudgingSet:
         return [generate_home(seed, config) for seed in range(self.first_seed, self.first_seed + self.count)]
 
 
-JUDGING_SETS = {
-    "offices": JudgingSet("office", 2_000_000_000),
-    "dead_ends": JudgingSet("dead_ends", 2_100_000_000),
-}
+JUDGING_SETS = {"offices": JudgingSet("office", 2_000_000_000), "dead_ends": JudgingSet("dead_ends", 2_100_000_000)}
 """20 office floors, and 20 homes whose rooms and doors make a tree."""
 
 

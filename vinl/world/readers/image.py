@@ -15,8 +15,7 @@ from vinl.config.errors import InputError
 from vinl.config.loader import read_yaml
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import RESOLUTION, FloorPlan, assemble_floorplan, frame_around
-from vinl.world.raster import drop_specks, paint_boxes, split_rectangles
-from vinl.world.readers.enclosure import find_inside
+from vinl.world.raster import drop_specks, find_inside, paint_boxes, split_rectangles
 
 DEFAULT_RESOLUTION = 0.05
 """Metres per pixel of a picture that comes without a scale: the usual one of laser-scanned maps."""

@@ -40,15 +40,16 @@ def read_json_plan(
     Raises:
         InputError: if the file is broken, holds no such plan, or the plan has no floor for the robot.
     """
-    packed = file.name.lower().endswith(".gz")
-    bare = file.name.lower().removesuffix(".gz")
-    house, count = _pick_line(file, packed, index or 0) if bare.endswith(".jsonl") else _pick(file, packed, index or 0)
+    bare, k = file.name.lower().removesuffix(".gz"), index or 0
+    plans, as_lines = _read_plans(file), bare.endswith(".jsonl")
+    if not 0 <= k < len(plans):
+        raise InputError(f"{file}:{k}: no plan with this number; they go from 0 to {len(plans) - 1}")
+    house = _parse(plans[k], f"{file}:{k}") if as_lines else plans[k]
     if not isinstance(house, dict):
         raise InputError(f"{file}: not a floor plan; a JSON object with 'rooms' and 'walls' is needed")
-    several = index is not None or (count or 2) > 1
-    stem = file.name[: -len(".jsonl.gz")] if bare.endswith(".jsonl") and packed else Path(bare).stem
-    name = f"{stem}:{index or 0}" if several else stem
-    source = f"{file}:{index or 0}" if several else str(file)
+    stem = file.name[: -len(".jsonl.gz")] if as_lines and file.name.lower().endswith(".gz") else Path(bare).stem
+    several = index is not None or len(plans) > 1
+    name, source = (f"{stem}:{k}", f"{file}:{k}") if several else (stem, str(file))
     try:
         if house.get("schema") is not None:
             if house["schema"] == BOXES_SCHEMA:
@@ -80,33 +81,37 @@ def count_plans(file: Path) -> int:
     Raises:
         InputError: if it is broken, or no JSON.
     """
-    name = file.name.lower()
-    packed = name.endswith(".gz")
-    if name.removesuffix(".gz").endswith(".jsonl"):
-        return len(_read_lines(file, packed))
-    if not name.removesuffix(".gz").endswith(".json"):
+    if not file.name.lower().removesuffix(".gz").endswith((".json", ".jsonl")):
         raise InputError(f"{file}: only JSON files hold several plans")
-    return _pick(file, packed, 0)[1]
+    return len(_read_plans(file))
 
 
-def _read_lines(file: Path, packed: bool) -> list[str]:
-    """Lines that are not empty; those of small files stay in memory, to be picked from."""
+def _read_plans(file: Path) -> list[Any]:
+    """What a file holds: one plan, a list of plans, or lines that are not empty, each a plan's text."""
     try:
-        status = file.stat()
-        read = _cache_lines if status.st_size < _SMALL else _cache_lines.__wrapped__
-        return read(file, packed, status.st_mtime_ns)
+        if file.name.lower().removesuffix(".gz").endswith(".jsonl"):
+            status = file.stat()
+            read = _cache_lines if status.st_size < _SMALL else _cache_lines.__wrapped__
+            plans: Any = read(file, status.st_mtime_ns)
+        else:
+            with _open_text(file) as stream:
+                plans = _parse(stream.read(), str(file))
     except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
         raise _explain(file, error) from None
+    plans = plans if isinstance(plans, list) else [plans]
+    if not plans:
+        raise InputError(f"{file}: the file is empty; it should hold a floor plan")
+    return plans
 
 
 @lru_cache(maxsize=2)
-def _cache_lines(file: Path, packed: bool, written: int) -> list[str]:
-    with _open_text(file, packed) as lines:
+def _cache_lines(file: Path, written: int) -> list[str]:
+    with _open_text(file) as lines:
         return [line for line in lines if line.strip()]
 
 
-def _open_text(file: Path, packed: bool):
-    return gzip.open(file, "rt", encoding="utf-8") if packed else file.open(encoding="utf-8")
+def _open_text(file: Path):
+    return (gzip.open if file.name.lower().endswith(".gz") else open)(file, "rt", encoding="utf-8")
 
 
 def _explain(file: Path, error: Exception) -> InputError:
@@ -124,33 +129,6 @@ def _parse(text: str, where: str) -> Any:
         return json.loads(text)
     except (ValueError, RecursionError) as error:  # ValueError: also a number of thousands of digits
         raise InputError(f"{where}: broken JSON ({error}); is the file complete?") from None
-
-
-def _pick_line(file: Path, packed: bool, index: int) -> tuple[Any, int | None]:
-    """One line of JSON lines, and how many there are."""
-    lines = _read_lines(file, packed)
-    _check_index(file, index, len(lines))
-    return _parse(lines[index], f"{file}:{index}"), len(lines)
-
-
-def _pick(file: Path, packed: bool, index: int) -> tuple[Any, int]:
-    """One plan of a JSON file that holds one or a list, and how many it holds."""
-    try:
-        with _open_text(file, packed) as stream:
-            content = _parse(stream.read(), str(file))
-    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
-        raise _explain(file, error) from None
-    plans = content if isinstance(content, list) else [content]
-    _check_index(file, index, len(plans))
-    return plans[index], len(plans)
-
-
-def _check_index(file: Path, index: int, count: int | None) -> None:
-    if count == 0:
-        raise InputError(f"{file}: the file is empty; it should hold a floor plan")
-    if index < 0 or (count is not None and index >= count):
-        last = f"0 to {count - 1}" if count else "0 on"
-        raise InputError(f"{file}:{index}: no plan with this number; they go from {last}")
 
 
 _RANGE = re.compile(r"^(?P<file>.+?):(?P<first>\d+)-(?P<last>\d*)(?:/(?P<step>\d+))?$")

@@ -15,8 +15,7 @@ from vinl.config.errors import InputError
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan, assemble_floorplan, frame_around, measure_clearance
 from vinl.world.grid import GridFrame
-from vinl.world.raster import label_regions, split_rectangles
-from vinl.world.readers.enclosure import find_inside
+from vinl.world.raster import find_inside, label_regions, split_rectangles
 from vinl.world.start_goal import check_way
 
 STEP = 0.08

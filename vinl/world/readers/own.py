@@ -124,9 +124,9 @@ def write_floorplan(plan: FloorPlan, file: str | Path) -> Path:
     grid |= {"rows": frame.shape[0], "columns": frame.shape[1]}
     lists = {
         "inside": [[round(float(v), 6) for v in row] for row in inside],
-        "walls": _list(plan.walls),
-        "furniture": _list(plan.furniture),
-        "windows": _list(plan.windows),
+        "walls": plan.walls.rows.tolist(),
+        "furniture": plan.furniture.rows.tolist(),
+        "windows": plan.windows.rows.tolist(),
         "labels": [{"name": label.name, "at": [label.x, label.y]} for label in plan.labels],
     }
     parts = [f'  "schema": "{BOXES_SCHEMA}"', f'  "name": {json.dumps(plan.name)}', f'  "grid": {json.dumps(grid)}']
@@ -139,7 +139,3 @@ def write_floorplan(plan: FloorPlan, file: str | Path) -> Path:
     except OSError as error:
         raise InputError(f"{file}: cannot be written ({error.strerror}); choose another place") from None
     return file
-
-
-def _list(boxes: Boxes) -> list[list[float]]:
-    return boxes.rows.tolist()

@@ -10,8 +10,7 @@ from vinl.config.errors import InputError
 from vinl.world.boxes import FARTHEST, Boxes
 from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan, frame_around
 from vinl.world.grid import GridFrame
-from vinl.world.raster import label_regions, paint_boxes
-from vinl.world.readers.enclosure import find_inside
+from vinl.world.raster import find_inside, label_regions, paint_boxes
 from vinl.world.readers.segments import Opening, Wall, box_along, raise_walls
 
 WALL_THICKNESS = 0.12

@@ -1,12 +1,24 @@
-"""Warp's structs from torch and from configurations."""
+"""Warp beside torch: launches in order with torch's work, and structs from tensors and configurations."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
 import warp as wp
+
+
+def find_stream(device: torch.device) -> wp.Stream | None:
+    """Torch's current stream on a GPU; None on a CPU."""
+    return None if device.type == "cpu" else wp.stream_from_torch(torch.cuda.current_stream(device))
+
+
+def launch(
+    kernel: Any, dim: int | Sequence[int], inputs: Sequence[Any], device: torch.device, outputs: Sequence[Any] = ()
+) -> None:
+    """Launch a kernel on Warp's arrays; on a GPU it runs in order with torch's work."""
+    wp.launch(kernel, dim, inputs, outputs, device=str(device), stream=find_stream(device))
 
 
 def allocate_struct(kind: Any, n: int, device: torch.device | str) -> tuple[Any, dict[str, torch.Tensor]]:
