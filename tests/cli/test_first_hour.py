@@ -79,6 +79,7 @@ MISTAKES = {
     "eval --floorplans harbor_flat": "did you mean 'harbour_flat'",
     "eval --out=": "--out is empty",
     "eval --out /proc/foo": "nothing can be written there",
+    "bench memory --config loco/rough": "--config loco/rough is a config of locomotion, not of navigation",
     "train-loco --config nav/default": "use vinl train-nav --config nav/default",
     "train-nav --config loco/rough": "use vinl train-loco --config loco/rough",
     "train-loco --stage 2 --from vinl/nav": "nav is a navigation policy: use vinl train-nav",

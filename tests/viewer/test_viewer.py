@@ -36,7 +36,7 @@ def test_everything_is_drawn(viewer: Viewer):
     time.sleep(1.0)
     wait_until_drawn(viewer)
     assert viewer.session.snapshot.world.plan.name == "mill_loft"
-    assert f'src="{viewer.url}"' in viewer._repr_html_()
+    assert f'src="{viewer.url}"' in viewer._repr_html_() and repr(viewer) == f"Viewer({viewer.url})"
     viewer.close()
 
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from rich.console import Console
 from rich.table import Table
 
-from vinl.cli.options import Settings, parse_options, settings_first
+from vinl.cli.options import Settings, check_config, parse_options, settings_first
 from vinl.config.errors import InputError
 
 
@@ -120,6 +120,7 @@ def _bench_loco(options: LocoOptions) -> dict[str, Any]:
     from vinl.config.loader import load_config
     from vinl.loco.config import LocoConfig
 
+    check_config(options.config, "locomotion")
     config = load_config(LocoConfig, options.config, options.overrides)
     from vinl.loco.benchmark import run_loco
 
@@ -135,6 +136,7 @@ def _bench_nav(options: NavOptions) -> dict[str, Any]:
     from vinl.nav.benchmark import run_nav
     from vinl.nav.config import NavConfig
 
+    check_config(options.config, "navigation")
     config = load_config(NavConfig, options.config, options.overrides)
     tree = None if options.tree == "auto" else options.tree
     return run_nav(options.num_envs, options.homes, options.seconds, device, config, tree)
@@ -145,6 +147,7 @@ def _predict_memory(options: MemoryOptions) -> dict[str, Any]:
     from vinl.nav.benchmark import predict_memory
     from vinl.nav.config import NavConfig
 
+    check_config(options.config, "navigation")
     figures = predict_memory(load_config(NavConfig, options.config, options.overrides))
     return {f"{name}_gb": round(value, 2) for name, value in figures.items()}
 

@@ -188,6 +188,9 @@ class Viewer:
                 raise error
             time.sleep(0.2)
 
+    def __repr__(self) -> str:
+        return f"Viewer({self.url})"
+
     def _repr_html_(self) -> str:
         """In a notebook: the page in a frame."""
         return f'<iframe src="{self.url}" width="100%" height="640" style="border:0;border-radius:8px"></iframe>'
