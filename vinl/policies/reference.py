@@ -88,7 +88,8 @@ class GaitReference(nn.Module):
 
         moves = (~(stands & loaded))[..., None]
         target = leg_angles(torch, torch.where(moves, path, under))
-        push = carry_weight(feet, row("load_ahead"))
+        # in double: with the weight on few feet it cancels, and an exported policy would differ by 1e-4
+        push = carry_weight(feet.double(), row("load_ahead").double()).to(feet.dtype)
         up = -gravity / gravity.norm(dim=1, keepdim=True).clip(min=1e-6)
         force = push[..., None] * up[:, None]  # of the ground on each foot, in the trunk's frame
         torque = -(leg_jacobian(torch, joints) * force[..., None]).sum(-2)
