@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
+from vinl.gait.arrays import constant
 from vinl.gait.clock import swing_fraction
 from vinl.gait.config import GaitConfig
 from vinl.gait.state import GaitState
@@ -72,8 +75,8 @@ def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: f
     lift = xp.where(swinging[..., None], gait.lift, feet)
     forth = xp.clip((s - _WAIT) / (1 - _WAIT - _SETTLE), 0.0, 1.0)
     forth = (0.5 - 0.5 * xp.cos(math.pi * forth))[..., None]
-    beyond = xp.concatenate([(gait.target - lift)[..., :2] * (1 + draw), (gait.target - lift)[..., 2:]], -1)
-    straight = lift + beyond * forth
+    beyond = constant(xp, np.array([1 + draw, 1 + draw, 1.0], np.float32), lift)
+    straight = lift + (gait.target - lift) * beyond * forth
     bell = (xp.sin(math.pi * s) + 1e-6) ** _STEEP  # s = 1 gives a sine just below 0 in float32
     height = straight[..., 2] + (gait.apex - straight[..., 2]) * bell
     path = xp.concatenate([straight[..., :2], height[..., None]], -1)

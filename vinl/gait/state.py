@@ -23,13 +23,11 @@ START_PHASE = 0.9
 FREEZE = 0.75
 """A foot that has swung for this fraction of its swing comes down where it was going."""
 
-
 _RISE = 0.12
 """Time constant with which the trunk rises and sinks [s]."""
 
 _OVER = 0.05
 """A knee under the hip passes this far above a block [m]."""
-
 
 _MISSED = 0.12
 """A trunk need not catch up with more than this [m]: it may have been held up."""
