@@ -2,9 +2,9 @@
 
     python scripts/ship_policy.py runs/nav nav --half --from runs/nav-first --commit HASH
 
-Paths of the machine that trained it stay out of the card: of files of floor plans, and of the policy that a student's
-image network and memory come from, only the name is kept, and what the run started from is named by --from. Measure it
-afterwards (scripts/measure_policy.py).
+Paths of the machine that trained it stay out of the card: of files of floor plans only the name is kept, and what the
+run started from is named by --from. Trainings behind it that ship themselves are named as they ship: ship them first.
+Measure it afterwards (scripts/measure_policy.py).
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from vinl.config.paths import assets_dir
-from vinl.policies.card import PolicyCard
+from vinl.policies.card import PolicyCard, read_card
 from vinl.policies.io import load_policy, save_policy
 
 
@@ -28,17 +29,23 @@ def clean(
     if "homes" in training:
         plans = [Path(plan).name for plan in training["homes"].get("plans", ())]
         training["homes"] = training["homes"] | {"plans": plans}
-    if training.get("student"):
-        begun = training["student"].get("start")
-        training["student"] = training["student"] | {"start": begun and Path(begun).name}
     if training.get("lineage"):
         *past, last = training["lineage"]
+        shipped = shipped_trainings()
+        past = [shipped.get(part["weights_sha256"], part) for part in past]
         training["lineage"] = [*past, last | {"training": f"vinl/{name}", "commit": commit or card.commit}]
-    if start is not None:
-        training["from_policy"] = start
-        if training.get("origin"):
-            training["origin"] = training["origin"] | {"policy": start}
+        if start is not None:
+            training["from_policy"] = start
+            if training.get("origin"):
+                training["origin"] = training["origin"] | {"policy": start, "commit": past[-1]["commit"]}
     return replace(card, name=name, training=training, action=action, commit=commit or card.commit, evaluation={})
+
+
+def shipped_trainings() -> dict[str, dict[str, Any]]:
+    """The last trainings of the shipped policies, by the digests of their weights."""
+    cards = (read_card(path.parent) for path in sorted((assets_dir() / "policies").glob("*/card.json")))
+    last = (card.training["lineage"][-1] for card in cards if card.training.get("lineage"))
+    return {part["weights_sha256"]: part for part in last if "weights_sha256" in part}
 
 
 def main() -> None:

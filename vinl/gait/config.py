@@ -34,17 +34,17 @@ class GaitConfig:
 
     stride: float = 0.48
     period: tuple[float, float] = (0.6, 1.4)
-    swing_time: float = 0.3
-    swing_fraction: float = 0.3
+    swing_time: float = 0.45
+    swing_fraction: float = 0.45
     stance: tuple[float, float] = (0.24, 0.15)
-    hip_height: float = 0.42
+    hip_height: float = 0.43
     highest_hip: float = 0.47
     lift: float = 0.08
-    edge: float = 0.05
-    shank: float = 0.05
+    edge: float = 0.04
+    shank: float = 0.045
     map: bool = True
-    modulate: float = 0.4
-    capture: float = 0.35
+    modulate: float = 0.5
+    capture: float = 0.1
 
     def __post_init__(self) -> None:
         low, high = self.period

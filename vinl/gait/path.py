@@ -17,7 +17,7 @@ _WAIT, _SETTLE = 0.12, 0.2
 """At the beginning and at the end of a swing the foot moves up or down alone, for these fractions of it: the shank
 follows the foot, and a foot lags behind its path."""
 
-DRAW = 0.08
+DRAW = 0.04
 """A foot draws back by this fraction of its stride as it takes its load: its path ends so far beyond its foothold."""
 
 _STEEP = 0.6

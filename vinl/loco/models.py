@@ -29,8 +29,7 @@ class UncheckedGaussian(GaussianDistribution):
 
 
 class StepModel(MLPModel):
-    """rsl-rl actor that is not given the height scan: proprioception and the rows of the gait go into the MLP. What it
-    gives is added to ``policies.reference.GaitReference``, which ``LocoVecEnv`` does in training.
+    """rsl-rl actor that is not given the height scan: proprioception and the rows of the gait go into the MLP.
 
     Args:
         gait: fields of the ``GaitConfig``, for the exported actor.
@@ -42,7 +41,7 @@ class StepModel(MLPModel):
         super().__init__(*args, **rest)
         last = self.mlp[-1]
         assert isinstance(last, nn.Linear)
-        nn.init.normal_(last.weight, std=_FIRST_WEIGHTS)  # it begins by following its gait
+        nn.init.normal_(last.weight, std=_FIRST_WEIGHTS)  # it begins by standing
         nn.init.zeros_(last.bias)
 
     def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> torch.Tensor:

@@ -20,7 +20,6 @@ from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.io import save_policy
 from vinl.policies.lineage import find_commit
-from vinl.policies.reference import GaitReference
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
 
 WARMUP_RATE = 1e-3
@@ -125,7 +124,7 @@ def train_locomotor(
     torch.manual_seed(config.seed)
     torch.backends.cuda.matmul.allow_tf32 = True
     environment = LocoEnvironment(config)
-    env = LocoVecEnv(environment, device, GaitReference(config.gait))
+    env = LocoVecEnv(environment, device)
     commit = find_commit()
 
     def export(model: StepModel, samples: int) -> None:

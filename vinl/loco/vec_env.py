@@ -15,7 +15,6 @@ from tensordict import TensorDict
 from vinl.gait.state import GaitState
 from vinl.loco.environment import LocoEnvironment, Observations, StepResult
 from vinl.loco.state import EnvState
-from vinl.policies.reference import GaitReference
 from vinl.rl.stopwatch import Stopwatch
 
 if TYPE_CHECKING:
@@ -33,16 +32,13 @@ class LocoVecEnv(VecEnv):
     Args:
         environment: the robots.
         device: torch device; JAX must run on the same kind.
-        reference: of what is observed, added to the actions that ``step`` is given; None: nothing is.
 
     Attributes:
         followed: gives the gaits that robots follow, in torch, in place of the environment's own.
     """
 
-    def __init__(self, environment: LocoEnvironment, device: str, reference: GaitReference | None = None) -> None:
+    def __init__(self, environment: LocoEnvironment, device: str) -> None:
         self.environment = environment
-        self._reference = None if reference is None else reference.to(device)
-        self._seen = torch.zeros(0)
         self.num_envs, self.num_actions = environment.num_envs, 12
         self.max_episode_length = environment.episode_steps
         self.episode_length_buf = torch.zeros(self.num_envs, dtype=torch.long)
@@ -60,9 +56,6 @@ class LocoVecEnv(VecEnv):
 
     def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
         """Actions (n, 12) to observations, rewards (n,), dones (n,) and ``time_outs`` (n,)."""
-        if self._reference is not None:
-            with torch.no_grad():
-                actions = self._reference(self._seen) + actions
         seen, *ends = self._simulate(actions)
         reward, done, timeout = (self._to_torch(x) for x in ends)
         return self._pack(self._in_torch(seen), done), reward, done, {"time_outs": timeout.float()}
@@ -115,7 +108,6 @@ class LocoVecEnv(VecEnv):
     def _pack(self, seen: dict[str, torch.Tensor], done: torch.Tensor | None) -> TensorDict:
         """``seen``: the fields of ``Observations``; ``done`` (n,) where an episode has just begun, None: no step was
         made."""
-        self._seen = seen["noisy"]
         groups = {"policy": seen["noisy"], "critic": torch.cat([seen["exact"], seen["privileged"]], 1)}
         return TensorDict(groups, batch_size=[self.num_envs])  # type: ignore[arg-type]
 

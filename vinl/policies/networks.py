@@ -16,7 +16,6 @@ from vinl.config.errors import InputError
 from vinl.config.loader import build_config, closest
 from vinl.gait.config import GaitConfig
 from vinl.gait.observation import STEPPING_TABLE
-from vinl.policies.reference import GaitReference
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE
 
 NETWORKS: dict[str, type[PolicyNetwork]] = {}
@@ -117,8 +116,7 @@ class BlindActor(PolicyNetwork):
 
 
 class StepActor(PolicyNetwork):
-    """The deterministic locomotion actor of planned footholds: the motion that its gait asks for, and what a network
-    adds to it.
+    """The deterministic locomotion actor of planned footholds.
 
     What it knows of the ground is where its feet shall go. Parameters are named ``actor.*``.
     """
@@ -131,12 +129,12 @@ class StepActor(PolicyNetwork):
         gait = dict(gait or {})
         self.keep_arguments(locals())
         self.observation_size, self.action_size = STEPPING_TABLE.size, actions
-        self.reference = GaitReference(build_config(GaitConfig, gait, source="network: gait"))
+        build_config(GaitConfig, gait, source="network: gait")
         self.actor = mlp([self.observation_size, *actor, actions], nn.ELU)
 
     def forward(self, observation: Float[Tensor, "n observation"]) -> Float[Tensor, "n actions"]:
         """Scaled observations in the order of ``gait.observation.STEPPING_TABLE`` to actions."""
-        return self.reference(observation) + self.actor(observation)
+        return self.actor(observation)
 
 
 def mlp(sizes: Sequence[int], activation: Callable[[], nn.Module]) -> nn.Sequential:

@@ -25,7 +25,6 @@ from vinl.gait.state import GaitState, aim, start_gait, swings, tick
 from vinl.policies.depth_memory import DepthMemory, State
 from vinl.policies.elevation_map import ElevationMap, MapState
 from vinl.policies.networks import PolicyNetwork, mlp
-from vinl.policies.reference import GaitReference
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, FOOT_RADIUS
 from vinl.robot.cameras import Camera
 
@@ -94,7 +93,6 @@ class SteppingActor(PolicyNetwork):
         self.image = None if eye is None else (eye.height, eye.width)
         self.elevation = None if eye is None else ElevationMap(eye)
         self.velocity = nn.Linear(hidden, 3)
-        self.reference = GaitReference(self.gait)
         self.actor = mlp([STEPPING_TABLE.size, *actor, actions], nn.ELU)
         nn.init.normal_(self.velocity.weight, std=0.01)  # it begins with the belief that it stands
         nn.init.zeros_(self.velocity.bias)
@@ -226,7 +224,7 @@ class SteppingActor(PolicyNetwork):
         rows = gait_rows(torch, self.gait, gait, feet) * self.rows_scale
         scale = STEPPING_TABLE.terms[0].scale[0]
         observed = torch.cat([said.velocity * scale, vector, rows], 1)
-        return self.reference(observed) + self.actor(observed), gait
+        return self.actor(observed), gait
 
     def forward(
         self,
