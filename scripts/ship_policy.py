@@ -23,14 +23,16 @@ def clean(
     card: PolicyCard, name: str, start: str | None, commit: str | None, max_speed: float | None = None
 ) -> PolicyCard:
     """The card under its shipped name, with no measurements of another policy."""
-    training, action = dict(card.training), dict(card.action)
+    training: dict[str, Any] = dict(card.training)
+    action = dict(card.action)
     if max_speed is not None:
         action["forward_speed"] = [0.0, max_speed]
     if "homes" in training:
         plans = [Path(plan).name for plan in training["homes"].get("plans", ())]
         training["homes"] = training["homes"] | {"plans": plans}
-    if training.get("lineage"):
-        *past, last = training["lineage"]
+    lineage: list[dict[str, Any]] = list(training.get("lineage") or [])
+    if lineage:
+        *past, last = lineage
         shipped = shipped_trainings()
         past = [shipped.get(part["weights_sha256"], part) for part in past]
         training["lineage"] = [*past, last | {"training": f"vinl/{name}", "commit": commit or card.commit}]

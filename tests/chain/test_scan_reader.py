@@ -5,7 +5,6 @@ import numpy as np
 from vinl.chain.ground_reader import ScanReader
 from vinl.robot.aliengo import home_qpos
 from vinl.robot.observation import SCAN_POINTS
-from vinl.sensing.detour import DetourConfig
 from vinl.world.boxes import Blocks
 from vinl.world.floorplan import FloorPlan
 
@@ -23,21 +22,3 @@ def test_walls_are_high(two_rooms: FloorPlan) -> None:
     scan = ScanReader.on_plan(two_rooms, [Blocks.empty()]).read(home_qpos(0.5, 3.0)[None])[0]
     np.testing.assert_allclose(scan[np.isclose(SCAN_POINTS[:, 0], -0.5)], 2.5)
     assert (scan[SCAN_POINTS[:, 0] > 0] == 0).all()
-
-
-def test_each_robot_goes_around_its_own_blocks(two_rooms: FloorPlan) -> None:
-    here = Blocks(np.array([[7.0, 3.2, 0.0, 0.3, 0.3, 0.15]]))
-    qpos, command = np.stack([home_qpos(5.8, 3.0)] * 3), np.array([[0.6, 0.0, 0.0]] * 3)
-    blocks = [Blocks.empty(), here, Blocks.empty()]
-    bent = ScanReader.on_plan(two_rooms, blocks, detour=DetourConfig()).bend(qpos, command)
-    assert (bent[[0, 2]] == command[[0, 2]]).all()
-    assert bent[1, 1:].sum() < -0.02 and (bent[1, 1:] <= 0).all() and bent[1, 0] == 0.6
-    assert (ScanReader.on_plan(two_rooms, blocks).bend(qpos, command) == command).all()
-
-
-def test_a_detour_keeps_clear_of_walls(two_rooms: FloorPlan) -> None:
-    along = np.array([[0.6, 0.0, 0.0]])
-    walls = ScanReader.on_plan(two_rooms, [Blocks.empty()], detour=DetourConfig())
-    sideways, turn = walls.bend(home_qpos(6.0, 0.2)[None], along)[0, 1:]
-    assert sideways + turn > 0.02  # away from the wall on its right
-    assert (walls.bend(home_qpos(6.0, 3.0)[None], along) == along).all()

@@ -92,8 +92,6 @@ def test_the_student_is_rebuilt_from_its_description():
     vector, fresh = torch.randn(3, 2, 48), torch.zeros(3, 2).bool()
     action, state = again(None, vector, again.initial_state(2), fresh)
     assert action.shape == (3, 2, 12) and state[0].shape == (2, 2, 8) and again.image is None
-    code, _ = network.encode(None, vector, network.initial_state(2), fresh)
-    assert torch.equal(network.act(vector, code), action)
     for wrong in ({"vision": "eye"}, {"hidden": "wide"}, {"hidden": 0}):
         with pytest.raises(InputError):
             build_network({"class": "DepthActor", **wrong})

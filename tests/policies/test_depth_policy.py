@@ -106,10 +106,9 @@ def test_it_comes_back_from_its_folder(card: PolicyCard, tmp_path: Path) -> None
     assert LearnedNavigator(policy).camera == CAMERA
 
 
-@pytest.mark.parametrize("detour", [False, True])
-def test_a_student_acts_alike_when_it_comes_back(detour: bool, tmp_path: Path) -> None:
+def test_a_student_acts_alike_when_it_comes_back(tmp_path: Path) -> None:
     torch.manual_seed(0)
-    student = DepthActor(height=18, width=32, visual=8, hidden=8, layers=1, actor=(16,), detour=detour)
+    student = DepthActor(height=18, width=32, visual=8, hidden=8, layers=1, actor=(16,))
     camera = replace(LOCOMOTION_CAMERA, width=32, height=18)
     card = locomotion_card("student", student.describe(), scan=False, camera=camera.describe())
     back = load_policy(save_policy(tmp_path / "student", student, card))

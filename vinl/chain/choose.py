@@ -15,12 +15,11 @@ from vinl.chain.navigators.recovery import RecoveringNavigator
 from vinl.config.errors import InputError
 from vinl.config.loader import closest
 from vinl.gait.observation import SENSED_TABLE
-from vinl.policies.card import find_detour, find_gait, locomotion_table, read_card
+from vinl.policies.card import find_gait, locomotion_table, read_card
 from vinl.policies.io import find_policy, list_policies, load_policy
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
-from vinl.robot.observation import PROPRIOCEPTION_SIZE
 
 BEST_FIRST = ("loco", "teacher", "rough")
 """Shipped locomotors, the one that is wanted most first."""
@@ -90,8 +89,7 @@ def check_locomotion_policy(policy: Policy) -> None:
     """Refuse a policy that is no locomotor, or observes what there is not.
 
     Raises:
-        InputError: it is of another kind, its table is none that the robot has, or its commands are bent as they
-            cannot be.
+        InputError: it is of another kind, or its table is none that the robot has.
     """
     card = policy.card
     if card.kind != "locomotion":
@@ -103,8 +101,6 @@ def check_locomotion_policy(policy: Policy) -> None:
             f"policy {card.name} observes {card.observation_size} numbers; the robot has {plain}, or {scanned} "
             "with the height scan"
         )
-    if find_detour(card) is not None and card.observation_size == PROPRIOCEPTION_SIZE:
-        raise InputError(f"policy {card.name}: commands are bent only for one that observes the height scan")
 
 
 NAVIGATOR = "nav"

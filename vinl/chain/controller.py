@@ -11,7 +11,7 @@ from vinl.chain.depth_cameras import CameraErrors, DepthCameras, RealCameras, op
 from vinl.chain.ground_reader import GaitReader, ScanReader, map_plan
 from vinl.config.errors import InputError
 from vinl.gait.observation import SENSED_TABLE, insert_gait
-from vinl.policies.card import PolicyCard, find_detour, find_gait, reads_ground
+from vinl.policies.card import PolicyCard, find_gait, reads_ground
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import DEFAULT_POSE
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, observe
@@ -93,7 +93,7 @@ class LocomotionController:
         """
         ground = None
         if self._scan is not None:
-            ground, command = self._scan.read(qpos), self._scan.bend(qpos, command)
+            ground = self._scan.read(qpos)
         observation = observe(np, qpos, qvel, command, self.actions, ground)[:, self._first :]
         if self._gait is not None:
             observation = insert_gait(np, observation, self._gait.read(qpos, qvel, command))
@@ -114,7 +114,7 @@ def open_controller(
 ) -> LocomotionController:
     """The controller of robots in a floor plan, each with its own clutter, see ``open_depth_cameras``; ``errors`` are
     those of their cameras."""
-    scan = ScanReader.on_plan(plan, blocks, find_detour(locomotor.card)) if reads_ground(locomotor.card) else None
+    scan = ScanReader.on_plan(plan, blocks) if reads_ground(locomotor.card) else None
     cameras = None if locomotor.camera is None else open_depth_cameras(plan, blocks, locomotor.camera, ceiling)
     config = find_gait(locomotor.card)
     gait = None if config is None else GaitReader(config, map_plan(plan, blocks))

@@ -23,7 +23,6 @@ from vinl.gait.state import (
     velocity_in_heading_frame,
 )
 from vinl.robot.observation import SCAN_RADIUS
-from vinl.sensing.detour import DetourConfig, bend_command, keep_out
 from vinl.sensing.height_scan import scan_ground
 from vinl.world.boxes import Blocks, Boxes
 from vinl.world.floorplan import BODY_HEIGHT, FloorPlan
@@ -68,39 +67,26 @@ class ScanReader:
 
     Args:
         fields: one for each robot, or one for all.
-        detour: how commands are bent; None: not at all.
     """
 
-    def __init__(self, fields: Sequence[HeightField], detour: DetourConfig | None = None) -> None:
+    def __init__(self, fields: Sequence[HeightField]) -> None:
         self._heights = np.concatenate([field.heights for field in fields]).ravel()
         self._stack = Stack(fields[0].frame, len(fields))
-        self._detour = None
-        if detour is not None:
-            closed = np.concatenate([keep_out(field, detour.margin) for field in fields]).ravel()
-            self._detour = closed, detour
 
     @classmethod
-    def on_plan(cls, plan: FloorPlan, blocks: Sequence[Blocks], detour: DetourConfig | None = None) -> ScanReader:
+    def on_plan(cls, plan: FloorPlan, blocks: Sequence[Blocks]) -> ScanReader:
         """Of robots in a floor plan, each with its own blocks. Walls and furniture stand as heights on the plan's grid;
         what hangs above the robot leaves the floor free.
 
         Level ground lies around them, as wide as robots look from where they are: none reads a neighbour's grid.
         """
-        reach = max(SCAN_RADIUS, 0.0 if detour is None else detour.reach)
-        field = flat_field(plan.frame.widen(int(np.ceil(reach / plan.frame.resolution)) + 1))
+        field = flat_field(plan.frame.widen(int(np.ceil(SCAN_RADIUS / plan.frame.resolution)) + 1))
         raise_boxes(field, plan.boxes.below(BODY_HEIGHT), WALL)
-        return cls(raise_blocks(field, blocks), detour)
+        return cls(raise_blocks(field, blocks))
 
     def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n points"]:
         """Height of the ground [m] under the scan points of every robot."""
         return scan_ground(np, self._heights, self._stack.frame, self._stack.place(qpos))
-
-    def bend(self, qpos: Float[np.ndarray, "n 19"], command: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-        """The commands as the locomotor is given them: with detours, if it was trained with such."""
-        if self._detour is None:
-            return command
-        closed, config = self._detour
-        return bend_command(np, closed, self._stack.frame, self._stack.place(qpos), command, config)
 
 
 RIM = 2.0

@@ -19,7 +19,7 @@ from vinl.courses.block_contacts import BlockContacts, Strain, StrainReader
 from vinl.courses.courses import Course, Start
 from vinl.courses.grounds import Ground
 from vinl.courses.robot_records import RobotRecord, StepCounter, record_gait
-from vinl.policies.card import find_detour, find_gait, reads_ground
+from vinl.policies.card import find_gait, reads_ground
 from vinl.policies.policy import Policy
 from vinl.world.endings import MAX_TILT
 from vinl.world.grid import WALL
@@ -159,7 +159,7 @@ def run_trial(
 
 def controller_on_course(policy: Policy, ground: Ground, n: int) -> LocomotionController:
     """What a policy of n robots observes on a ground that all of them walk on."""
-    scan = ScanReader([ground.field], find_detour(policy.card)) if reads_ground(policy.card) else None
+    scan = ScanReader([ground.field]) if reads_ground(policy.card) else None
     cameras = None if policy.camera is None else DepthCameras([ground.mesh()], [0] * n, policy.camera)
     config = find_gait(policy.card)
     gait = None

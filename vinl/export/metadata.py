@@ -12,6 +12,7 @@ from vinl.chain.controller import ACTION_LIMIT
 from vinl.config.errors import InputError
 from vinl.config.loader import closest
 from vinl.export.step import DEPTH, NEXT, StateInput, Step
+from vinl.gait.path import LOAD_AHEAD, LOOK_AHEAD
 from vinl.policies.card import PolicyCard
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.identity import digest_weights
@@ -32,6 +33,17 @@ MEANINGS = {
     "joint_velocity": "joint speeds, in the order of joint_names",
     "previous_action": "the last output of the policy, a navigation policy's held to [-1, 1]; zeros when an episode "
     "begins",
+    "path_error": f"from each foot to the next point of its path; of the gait, as vinl.gait plans it; {HEADING}",
+    "path_ahead": f"from each foot to where its path is {LOOK_AHEAD:g} s later; {HEADING}",
+    "foothold": f"from each foot to where it comes down next, forward and left; {HEADING}",
+    "apex": "from a swinging foot up to the highest point of its path",
+    "leg_phase": "sine and cosine of each leg's phase",
+    "swing": "1 for each foot that swings by the clock",
+    "swing_ahead": f"the same, {LOOK_AHEAD:g} s later",
+    "load_ahead": f"1 for each foot that stands by the clock {LOAD_AHEAD:g} s later",
+    "rate": "how fast the clock of each leg runs while it stands, less 1",
+    "hip": "how far the hips should rise above their usual height",
+    "missed": f"how far the trunk has fallen behind its commands, forward and left; {HEADING}",
     "height_scan": f"height of the trunk's origin - {SCAN_OFFSET} m - height of the ground at points_m, held to +-1 m; "
     f"{HEADING}",
     "goal_distance": "straight horizontal distance from the trunk's origin to the goal, from odometry",

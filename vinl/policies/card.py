@@ -14,7 +14,6 @@ from vinl.gait.config import GaitConfig
 from vinl.gait.observation import GAIT_ROWS
 from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP
 from vinl.robot.observation import HEIGHT_SCAN, PROPRIOCEPTION, ObservationTable
-from vinl.sensing.detour import DetourConfig
 
 SCHEMA = 1
 """Version of ``card.json``."""
@@ -135,18 +134,6 @@ def find_gait(card: PolicyCard) -> GaitConfig | None:
 def reads_ground(card: PolicyCard) -> bool:
     """Whether a policy observes the height scan."""
     return any(row["name"] == HEIGHT_SCAN.name for row in card.observation)
-
-
-def find_detour(card: PolicyCard) -> DetourConfig | None:
-    """How a locomotor's commands are bent before it observes them; None: they are given as they are.
-
-    No training bends commands any more: this goes with the weights of ``teacher`` that have such a card.
-
-    Raises:
-        InputError: the card asks for a detour that there cannot be.
-    """
-    given = next((row.get("detour") for row in card.observation if row["name"] == "command"), None)
-    return None if given is None else build_config(DetourConfig, given, source=f"{card.name}: detour")
 
 
 PREVIOUS = ("action", "motion", "both")

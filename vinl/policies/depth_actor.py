@@ -10,16 +10,7 @@ from torch import Tensor, nn
 
 from vinl.policies.depth_memory import DepthMemory, State
 from vinl.policies.networks import PolicyNetwork, mlp
-from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCALE
-
-DETOUR = 0.1
-"""Unit of a detour in the code [m/s, rad/s]. No training has detours any more: what is here of them goes with the
-weights of ``loco`` that have such a card."""
-
-_COMMAND = slice(10, 12)
-"""Sideways speed and yaw rate of the command in the observation table."""
-
-_BEND = tuple(DETOUR * float(scale) for scale in SCALE[_COMMAND])
+from vinl.robot.observation import PROPRIOCEPTION_SIZE
 
 
 class DepthActor(PolicyNetwork):
@@ -29,13 +20,7 @@ class DepthActor(PolicyNetwork):
 
     Attributes:
         image: height and width that it takes [pixels]; None: it is blind.
-        detour: whether the teacher's commands were bent (``vinl.sensing.detour``). The code then ends with what has to
-            be added to the command, sideways and turning, in units of ``DETOUR``.
-        code: size of the code, the detour included.
-        bend: (2,) what one unit of the detour adds to the observed command.
     """
-
-    bend: Tensor
 
     def __init__(
         self,
@@ -51,44 +36,19 @@ class DepthActor(PolicyNetwork):
         code: int = 32,
         actor: Sequence[int] = (512, 256, 128),
         actions: int = 12,
-        detour: bool = False,
     ) -> None:
-        """Sizes as in ``DepthMemory``; ``actor`` are the widths of the actor's hidden layers, the teacher's; ``code``
-        is without the detour."""
+        """Sizes as in ``DepthMemory``; ``actor`` are the widths of the actor's hidden layers, the teacher's."""
         super().__init__()
         self.keep_arguments(locals())
-        self.observation_size, self.action_size, self.detour = proprioception, actions, detour
-        self.code = code + 2 * detour
-        # No weight, but on the device: to copy it there at every step would be to wait for the device. It has its
-        # numbers even where networks are built without any (``load_policy``).
-        self.register_buffer("bend", torch.tensor(_BEND, device="cpu"), persistent=False)
+        self.observation_size, self.action_size = proprioception, actions
         self.memory = DepthMemory(vision, height, width, proprioception, visual, hidden, layers, memory, planes)
         self.image = self.memory.image
-        self.head = nn.Linear(hidden, self.code)
+        self.head = nn.Linear(hidden, code)
         self.actor = mlp([proprioception + code, *actor, actions], nn.ELU)
 
     def initial_state(self, n: int, device: torch.device | str | None = None) -> State:
         """The state of n robots that remember nothing."""
         return self.memory.initial_state(n, device)
-
-    def encode(
-        self,
-        depth: Float[Tensor, "t n height width"] | None,
-        vector: Float[Tensor, "t n k"],
-        state: State,
-        fresh: Bool[Tensor, "t n"],
-    ) -> tuple[Float[Tensor, "t n code"], State]:
-        """The code alone, and the state after the last step; arguments as in ``forward``."""
-        features, state = self.memory(depth, vector, state, fresh)
-        return self.head(features), state
-
-    def act(self, vector: Float[Tensor, "*n k"], code: Float[Tensor, "*n code"]) -> Float[Tensor, "*n actions"]:
-        """Actions of a code, the student's or the teacher's."""
-        if self.detour:
-            code, bend = code[..., :-2], code[..., -2:] * self.bend
-            before, command, behind = vector.tensor_split((_COMMAND.start, _COMMAND.stop), -1)
-            vector = torch.cat([before, command + bend, behind], -1)
-        return self.actor(torch.cat([vector, code], -1))
 
     def forward(
         self,
@@ -108,5 +68,5 @@ class DepthActor(PolicyNetwork):
         Returns:
             (t, n, 12) actions, and the state after the last step.
         """
-        code, state = self.encode(depth, vector, state, fresh)
-        return self.act(vector, code), state
+        features, state = self.memory(depth, vector, state, fresh)
+        return self.actor(torch.cat([vector, self.head(features)], -1)), state
