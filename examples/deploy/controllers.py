@@ -37,12 +37,12 @@ class OnnxPolicy:
 class Locomotion(OnnxPolicy):
     """50 times a second: joint targets [rad]."""
 
-    def step(self, velocity, gyro, gravity, joints, joint_speeds, command, depth):
-        """From velocity, angular velocity and the direction of gravity in the trunk frame, all in SI units."""
+    def step(self, gyro, gravity, joints, joint_speeds, command, depth):
+        """From angular velocity and the direction of gravity in the trunk frame, all in SI units."""
         pose, limit = np.array(self.about["default_pose"]), self.about["action_clip"]
-        state = {"base_linear_velocity": velocity, "base_angular_velocity": gyro, "projected_gravity": gravity}
+        state = {"base_angular_velocity": gyro, "projected_gravity": gravity, "command": command}
         legs = {"joint_position": joints - pose, "joint_velocity": joint_speeds, "previous_action": self.last}
-        self.last = self.act({**state, **legs, "command": command}, depth)
+        self.last = self.act({**state, **legs}, depth)
         return pose + self.about["action_scale"] * np.clip(self.last, -limit, limit)
 
 

@@ -86,10 +86,9 @@ class VinlNode(Node):
             return
         names, twist = self.locomotion.about["joint_names"], self.odom.twist.twist
         order = [self.joints.name.index(name) for name in names]
-        velocity = np.array([twist.linear.x, twist.linear.y, twist.linear.z])
         gyro = np.array([twist.angular.x, twist.angular.y, twist.angular.z])
         joints, speeds = np.array(self.joints.position)[order], np.array(self.joints.velocity)[order]
-        target = self.locomotion.step(velocity, gyro, -self.trunk_rotation()[2], joints, speeds, self.command, depth)
+        target = self.locomotion.step(gyro, -self.trunk_rotation()[2], joints, speeds, self.command, depth)
         message = JointState(name=names, position=target.tolist())
         message.header.stamp = self.get_clock().now().to_msg()
         self.targets.publish(message)

@@ -28,10 +28,10 @@ def main(locomotion, navigation):
         return random.uniform(0, camera["far"], (camera["height"], camera["width"]))
 
     near, ahead = see(walk), see(steer)
-    velocity, gravity, command = np.array([0.5, 0, 0]), np.array([0, 0, -1]), np.array([0.5, 0, 0])
+    gravity, command = np.array([0, 0, -1]), np.array([0.5, 0, 0])
     joints, goal = np.array(walk.about["default_pose"]), np.array([5.0, 1.0])
     for policy, step in (
-        (walk, lambda: walk.step(velocity, np.zeros(3), gravity, joints, np.zeros(12), command, near)),
+        (walk, lambda: walk.step(np.zeros(3), gravity, joints, np.zeros(12), command, near)),
         (steer, lambda: steer.step(random.uniform(-1, 1, 3), goal, ahead)),
     ):
         median, slow = time_steps(step)

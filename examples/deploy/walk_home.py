@@ -56,8 +56,8 @@ def walk(scene, episode, locomotion, navigation, time_limit):
         if step % between == 0:
             pose = np.array([*before, np.arctan2(turn[1, 0], turn[0, 0])])  # a robot has it from odometry
             command = navigation.step(pose, goal, ahead.look(model, data))
-        velocity, gravity, depth = turn.T @ data.qvel[:3], -turn[2], near.look(model, data)  # estimator, IMU, camera
-        data.ctrl = locomotion.step(velocity, data.qvel[3:6], gravity, data.qpos[7:], data.qvel[6:], command, depth)
+        gravity, depth = -turn[2], near.look(model, data)  # IMU, camera
+        data.ctrl = locomotion.step(data.qvel[3:6], gravity, data.qpos[7:], data.qvel[6:], command, depth)
         mujoco.mj_step(model, data, substeps)
         path += np.linalg.norm(data.qpos[:2] - before)
         if np.linalg.norm(data.qpos[:2] - goal) < navigation.about["success_radius"]:

@@ -145,7 +145,7 @@ def test_locomotion_observes_as_vinl_does(example, exported, monkeypatch: pytest
         turn = np.zeros(9)
         mujoco.mju_quat2Mat(turn, qpos[3:7])
         turn = turn.reshape(3, 3)
-        state = turn.T @ qvel[:3], qvel[3:6], -turn[2], qpos[7:], qvel[6:]
+        state = qvel[3:6], -turn[2], qpos[7:], qvel[6:]
         target = policy.step(*state, command, np.ones((36, 64)))
         wanted = observe(np, qpos[None], qvel[None], command[None], last[None], np.zeros((1, 187)))[
             0, 3:48

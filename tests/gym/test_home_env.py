@@ -105,7 +105,7 @@ def test_oracle_walks_the_episode_that_evaluate_walks() -> None:
         rewards.append(reward)
         assert env.observation_space.contains(observation)
     assert info["record"] == plain_record(results.records[0])
-    assert over and info["success"] and info["spl"] > 0.8
+    assert over and info["success"] and info["spl"] > 0.7
     n = len(rewards)
     assert n == np.ceil(info["time_s"] / 0.5)
     least, most = 10 + began - info["geodesic_m"] - 0.005 * n, 10 + began - info["geodesic_m"] - 0.002 * n
@@ -117,7 +117,7 @@ def test_oracle_walks_the_episode_that_evaluate_walks() -> None:
 def test_joints_walk_the_episode_that_evaluate_walks(monkeypatch: pytest.MonkeyPatch) -> None:
     """A locomotor driven from outside, by actions that lose nothing: the reach is a power of two of its scale."""
     rules = replace(NEAR, time_limit=2.0)
-    policy = vinl.load_policy("rough")
+    policy = vinl.load_policy("no_pretraining")
     assert isinstance(policy, LocomotionPolicy) and JOINT_REACH / ACTION_SCALE == 16
     legs = batch_policy(policy)
     legs.reset(1)

@@ -111,7 +111,7 @@ def test_policies_that_do_not_fit_are_refused(tmp_path, config, walker, capsys):
     (folders["eyes"] / "card.json").write_text(json.dumps({**data, "kind": "navigation"}))
     words = {"small": "actor [8]", "soft": "kp 20", "other": "gait.stride=0.6", "eyes": "navigation"}
     cases = [(str(folders[name]), text) for name, text in words.items()]
-    cases += [("none", "unknown"), ("rough", "without the gait"), ("teacher", "without the gait")]
+    cases += [("none", "unknown"), ("blind", "without the gait"), ("no_pretraining", "without the gait")]
     for policy, text in cases:
         for stage in ("2", "3"):
             if stage == "3" and policy == str(folders["small"]):

@@ -43,7 +43,7 @@ def test_navigator_sees_and_remembers() -> None:
 
 
 def test_function_around_a_policy_walks_as_the_policy() -> None:
-    teacher = vinl.load_policy("teacher")
+    teacher = vinl.load_policy("no_pretraining")
 
     def same(observation: np.ndarray) -> torch.Tensor:
         assert observation.dtype == np.float32 and observation.shape == (1, 235)
