@@ -47,6 +47,7 @@ def main() -> None:
     middle, slow = np.quantile(costs[50:], [0.5, 0.99])
     print(f"{options.loco}, {options.nav} in {options.plan}: real-time factor {CONTROL_DT / cost:.1f}")
     print(f"a step of 20 ms costs {1000 * cost:.1f} ms; median {1000 * middle:.1f}, 99 % under {1000 * slow:.1f}")
+    print(f"{chain.snapshot(False).distance_m:.1f} m walked since the last start")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """Measure a locomotion policy with the project's own commands and write the figures into its card.
 
-    python scripts/measure_policy.py assets/policies/rough [--commit HASH] [--no-homes]
+    python scripts/measure_policy.py assets/policies/rough [--commit HASH] [--table runs/table/results.json]
 
-Takes minutes on two cores, longer for a policy that sees.
+Takes minutes on two cores, longer for a policy that sees. With a walked table, figures in homes come from its rows.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from vinl.cli.app import main as vinl
 from vinl.policies.card import read_card, write_card
 
 BLOCKS = "eval-loco --terrain blocks --robots 64 --seconds 20 --seed 0"
+BARS = "eval-loco --terrain bars --height 0.05 0.10 0.15 0.20 --crossings 128"
 LOCO = {
     "flat": "eval-loco --terrain flat --robots 64 --seconds 20 --seed 0",
     "flat_forward_only": "eval-loco --terrain flat --robots 64 --seconds 20 --seed 0 --commands forward",
@@ -28,7 +29,8 @@ LOCO = {
     "blocks_straight": f"{BLOCKS} --density 1.0 --commands straight",
     "blocks_navigator": f"{BLOCKS} --density 1.0 --commands navigator",
     "no_blocks": f"{BLOCKS} --density 0",
-    "bars": "eval-loco --terrain bars --height 0.05 0.10 0.15 0.20 --crossings 32 --seed 0",
+    "bars": f"{BARS} --seed 4001",
+    "bars_slow": f"{BARS} --speed 0.3 --seed 4002",
     "litter": "eval-loco --terrain litter --density 15 --robots 32 --seconds 20 --seed 0",
     "rooms": "eval-loco --terrain rooms --robots 72 --seconds 20 --seed 0 --density 1.0",
 }
@@ -57,7 +59,19 @@ LOCO_FIGURES = (
     "leg_leg_per_m",
     "joint_overspeed",
 )
-CHAIN_FIGURES = ("success", "spl", "foot_collisions_per_m", "leg_contacts_per_m")
+CHAIN_FIGURES = ("success", "spl", "foot_collisions_per_m", "paper_foot_collisions_per_m", "leg_contacts_per_m")
+ROWS = {
+    "homes": {"obstacles": "none", "navigation": "oracle"},
+    "homes_paper_clutter": {"obstacles": "paper", "navigation": "oracle"},
+    "chain_no_clutter": {"obstacles": "none", "navigation": "nav"},
+    "chain_paper_clutter": {"obstacles": "paper", "navigation": "nav"},
+}
+"""What a row of the table walks, by the group of the card that it gives."""
+
+
+def choose(figures: dict) -> dict:
+    """What a card keeps of one command's aggregate."""
+    return {key: figures[key] for key in LOCO_FIGURES if figures.get(key) is not None}
 
 
 def run(command: str, policy: Path) -> dict:
@@ -70,17 +84,34 @@ def run(command: str, policy: Path) -> dict:
         return json.loads((Path(out) / "results.json").read_text())["aggregate"]
 
 
+def take_rows(table: Path, name: str) -> dict[str, dict]:
+    """Groups of a card from the rows of a table without recovery: a locomotion policy's with its own legs, a navigation
+    policy's with ``loco``."""
+    data, groups = json.loads(table.read_text()), {}
+    for row, walked in data["rows"].items():
+        legs, guide = (walked["policies"][part]["name"] for part in ("locomotion", "navigation"))
+        if name not in (legs, guide) or (name == guide and legs != "loco") or row.endswith("recovery"):
+            continue
+        for group, asked in ROWS.items():
+            if asked == {"obstacles": walked["obstacles"], "navigation": guide}:
+                figures = {key: walked["aggregate"][key]["mean"] for key in CHAIN_FIGURES}
+                command = f"{' '.join(data['command'])}, row {row}"
+                groups[group] = {"command": command} | figures | {"falls": walked["aggregate"]["falls"]}
+    return groups
+
+
 def main() -> None:
     """Run every command and rewrite the card."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("policy", type=Path, help="policy folder")
     parser.add_argument("--commit", help="commit of the code that trained it, when the card does not know")
-    parser.add_argument("--no-homes", action="store_true", help="leave out the episodes in homes; the table has them")
+    parser.add_argument("--table", type=Path, help="results.json of a walked table: figures in homes are its rows'")
     options = parser.parse_args()
-    evaluation: dict[str, dict] = {}
     card = read_card(options.policy)
+    evaluation = card.evaluation | ({} if options.table is None else take_rows(options.table, card.name))
+    commands = (LOCO if options.table else LOCO | CHAIN) if card.kind == "locomotion" else {}
     ahead = card.training.get("commands", {}).get("left") == [0.0, 0.0]
-    for name, command in (LOCO if options.no_homes else LOCO | CHAIN).items():
+    for name, command in commands.items():
         row: dict = {"command": f"vinl {command}"}
         if ahead and name.endswith(FORWARD):
             # it was never told to go sideways, so that the two commands are one
@@ -88,7 +119,9 @@ def main() -> None:
             continue
         figures = run(command, options.policy)
         if name in LOCO:
-            row |= {key: figures[key] for key in LOCO_FIGURES if figures.get(key) is not None}
+            row |= choose(figures)
+            by_height = figures.get("by_height", {}) if name.startswith("bars") else {}
+            row |= {f"{height} m": choose(one) for height, one in by_height.items()}
         else:
             row |= {key: figures[key]["mean"] for key in CHAIN_FIGURES} | {"falls": figures["falls"]}
         evaluation[name] = row

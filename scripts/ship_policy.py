@@ -34,12 +34,14 @@ def clean(
     if lineage:
         *past, last = lineage
         shipped = shipped_trainings()
-        past = [shipped.get(part["weights_sha256"], part) for part in past]
+        past = [shipped.get(part.get("weights_sha256", ""), part) for part in past]
         training["lineage"] = [*past, last | {"training": f"vinl/{name}", "commit": commit or card.commit}]
-        if start is not None:
-            training["from_policy"] = start
-            if training.get("origin"):
-                training["origin"] = training["origin"] | {"policy": start, "commit": past[-1]["commit"]}
+        if past and training.get("origin"):
+            training["origin"] = training["origin"] | {"commit": past[-1]["commit"]}
+    if start is not None:
+        training["from_policy"] = start
+        if training.get("origin"):
+            training["origin"] = training["origin"] | {"policy": start}
     return replace(card, name=name, training=training, action=action, commit=commit or card.commit, evaluation={})
 
 

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -21,6 +22,7 @@ from vinl.chain.scene import build_scene
 from vinl.cli.app import main
 from vinl.export.policy import Exported
 from vinl.policies.io import load_policy
+from vinl.robot.cameras import LOCOMOTION_CAMERA
 from vinl.robot.observation import observe
 from vinl.world.clutter import CLUTTER
 from vinl.world.free_space import FreeSpace
@@ -147,9 +149,8 @@ def test_locomotion_observes_as_vinl_does(example, exported, monkeypatch: pytest
         turn = turn.reshape(3, 3)
         state = qvel[3:6], -turn[2], qpos[7:], qvel[6:]
         target = policy.step(*state, command, np.ones((36, 64)))
-        wanted = observe(np, qpos[None], qvel[None], command[None], last[None], np.zeros((1, 187)))[
-            0, 3:48
-        ]  # it does without the velocity
+        wanted = observe(np, qpos[None], qvel[None], command[None], last[None], np.zeros((1, 187)))[0]
+        wanted = wanted[3:48]  # without the velocity of the trunk
         np.testing.assert_allclose(given[-1], wanted, atol=1e-5)
         last = policy.last
         np.testing.assert_allclose(target, np.array(policy.about["default_pose"]) + 0.25 * last)
@@ -188,11 +189,11 @@ def test_navigation_observes_as_vinl_does(example, exported, monkeypatch: pytest
         pose = pose + random.normal(size=3) * [0.3, 0.3, 1.0]
 
 
-def test_depth_images_are_prepared(example: ModuleType):
+@pytest.mark.parametrize(("missing", "reads"), [("plane", 0.0), ("fill", 0.0), ("as_is", LOCOMOTION_CAMERA.far)])
+def test_depth_images_are_prepared(example: ModuleType, missing: str, reads: float):
     from depth_image import DepthPreparation
 
-    camera = load_policy("loco").camera
-    assert camera is not None
+    camera = replace(LOCOMOTION_CAMERA, missing=missing)
     about = camera.describe() | {"vfov": 2 * np.arctan(camera.tan_half[1])}
     # a camera with ten times the pixels and some more at each side, that sees a ramp to the left
     fx = 320 / camera.tan_half[0]
@@ -203,9 +204,9 @@ def test_depth_images_are_prepared(example: ModuleType):
     seen = prepare(image, 0.001)
     np.testing.assert_allclose(seen, np.broadcast_to(1.0 + 0.5 * tangents, (36, 64)), atol=3e-3)
     blank = prepare(np.zeros((480, 800), np.uint16), 0.001)
-    assert (blank == 0.0).all()
+    assert (blank == reads).all()
     narrow = DepthPreparation(about, 2 * fx, 2 * fx, 399.5, 239.5, 800, 480)(np.ones((480, 800), np.float32))
-    assert narrow[18, 32] == 1.0 and narrow[0, 0] == narrow[18, 0] == 0.0
+    assert narrow[18, 32] == 1.0 and narrow[0, 0] == narrow[18, 0] == reads
 
 
 def test_time_is_told(example: ModuleType, exported, capsys: pytest.CaptureFixture[str]):

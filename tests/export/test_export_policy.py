@@ -60,7 +60,8 @@ def test_loco(exported: dict[str, tuple[Path, Exported]]):
         "position": list(policy.camera.position)
     }
     np.testing.assert_allclose(camera["rotation"], policy.camera.rotation())
-    assert about["image_preparation"]["missing"].startswith("give pixels without a return as 0")
+    said = "give pixels without a return as 0: the network is told where they are"
+    assert about["image_preparation"]["missing"] == said
 
 
 def test_nav(exported: dict[str, tuple[Path, Exported]]):

@@ -43,14 +43,14 @@ def test_navigator_sees_and_remembers() -> None:
 
 
 def test_function_around_a_policy_walks_as_the_policy() -> None:
-    teacher = vinl.load_policy("no_pretraining")
+    walker = vinl.load_policy("no_pretraining")
 
     def same(observation: np.ndarray) -> torch.Tensor:
         assert observation.dtype == np.float32 and observation.shape == (1, 235)
-        return torch.as_tensor(teacher.act(observation))
+        return torch.as_tensor(walker.act(observation))
 
     own = vinl.walk(PLAN, vinl.as_locomotor(same, scan=True), config=SHORT).record
-    shipped = vinl.walk(PLAN, teacher, config=SHORT).record
+    shipped = vinl.walk(PLAN, walker, config=SHORT).record
     assert own.distance_m == pytest.approx(shipped.distance_m, abs=0.02)  # the last bits of a network vary
 
 

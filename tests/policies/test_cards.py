@@ -16,11 +16,11 @@ DIGESTS = {
     if "weights_sha256" in policy
 }
 MEASURED = [
-    ("nav", "chain_paper_clutter", "vinl"),
-    ("nav", "chain_no_clutter", "vinl_no_clutter"),
-    ("loco", "homes_paper_clutter", "vinl_oracle"),
-    ("loco", "homes", "vinl_no_clutter_oracle"),
-    ("teacher", "homes_paper_clutter", "teacher_oracle"),
+    (name, group, row)
+    for name, card in CARDS.items()
+    for group, figures in card["evaluation"].items()
+    for _, found, row in [figures["command"].partition(", row ")]
+    if found
 ]
 
 
@@ -46,6 +46,12 @@ def test_origin_is_what_the_card_of_that_policy_says() -> None:
     origin = CARDS["loco"]["training"]["origin"]
     assert origin["policy"] == "vinl/teacher"
     assert (origin["samples"], origin["commit"]) == (CARDS["teacher"]["samples"], CARDS["teacher"]["commit"])
+
+
+def test_policies_of_the_table_have_its_figures_on_their_cards() -> None:
+    told = {(name, row) for name, _, row in MEASURED}
+    assert {("nav", "vinl"), ("nav", "vinl_no_clutter"), ("loco", "vinl"), ("loco", "vinl_oracle")} <= told
+    assert {("teacher", "teacher"), ("teacher", "teacher_oracle"), ("loco", "vinl_no_clutter_oracle")} <= told
 
 
 @pytest.mark.parametrize(("name", "group", "row"), MEASURED)

@@ -51,7 +51,8 @@ def test_impossible_cameras(change):
 @pytest.mark.parametrize("name", list_policies())
 def test_shipped_policies_see_through_the_robots_cameras(name):
     camera = vinl.load_policy(name).camera
-    assert camera is None or camera == replace(CAMERAS[camera.name], missing=camera.missing)
+    marks = {"loco": {"missing": "plane"}}.get(name, {})  # it is told which pixels did not return
+    assert camera is None or camera == replace(CAMERAS[camera.name], **marks)
 
 
 def test_trainings_begin_with_the_robots_cameras():

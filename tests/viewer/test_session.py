@@ -1,10 +1,12 @@
 """The thread of a session keeps the pace of time, answers its queue and says what went wrong."""
 
+import re
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,8 @@ from vinl.config.errors import InputError
 from vinl.robot.aliengo import home_qpos
 from vinl.viewer.session import Pause, Push, Request, Reset, Session, SetPace, Snapshot, StepOnce
 from vinl.viewer.world import World, open_ground
+
+MEASURE = Path(__file__).resolve().parents[2] / "scripts" / "measure_play.py"
 
 
 class Counter:
@@ -119,34 +123,11 @@ def test_failure_of_the_source_ends_the_session_and_is_kept():
     assert said.paused and "joint came off" in said.notice[1] and isinstance(session.error, RuntimeError)
 
 
-REAL_TIME = """
-import time
-import torch
-import vinl
-from vinl.viewer.live import LiveChain
-from vinl.viewer.session import SetGoal
-from vinl.viewer.world import open_home
-
-torch.set_num_threads(1)
-config = vinl.EvaluationConfig()
-chain = LiveChain(open_home(vinl.load_floorplan("harbour_flat"), "paper", 0, config), "loco", "nav", config)
-x, y = chain.snapshot(True).qpos[:2]
-chain.apply(SetGoal(x + 1.5, y))
-chain.step()
-began = time.process_time()
-for k in range(100):
-    chain.step()
-    chain.snapshot(look=k % 12 == 0)
-print(chain.snapshot(False).distance_m, (time.process_time() - began) / 100, chain.dt)
-"""
-
-
 @pytest.mark.slow
 def test_chain_with_both_policies_and_images_is_faster_than_real_time():
     """Processor time, so that what runs beside it does not count: less than the 20 ms that a control step lasts. In a
     process of its own, for the types that tests check at run time double it."""
-    done = subprocess.run([sys.executable, "-c", REAL_TIME], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, str(MEASURE), "--seconds", "2"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    distance, cost, dt = map(float, done.stdout.split()[-3:])
-    assert distance > 0.2
-    assert cost < dt
+    (cost,), (metres,) = (re.findall(rf"([\d.]+) {unit}", done.stdout) for unit in ("ms;", "m walked"))
+    assert float(cost) < 20 and float(metres) > 0.2

@@ -18,7 +18,7 @@ import warp as wp
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
 from vinl.nav.home_builder import BuiltHome, HomeRecord, build_home, build_plan, prepare_home
-from vinl.nav.kernels import Homes
+from vinl.nav.home_grids import Homes
 from vinl.sensing.depth import build_mesh, check_device
 from vinl.sensing.torch_warp import find_stream
 from vinl.world.floorplan import FloorPlan

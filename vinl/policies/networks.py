@@ -129,7 +129,7 @@ class StepActor(PolicyNetwork):
         gait = dict(gait or {})
         self.keep_arguments(locals())
         self.observation_size, self.action_size = STEPPING_TABLE.size, actions
-        build_config(GaitConfig, gait, source="network: gait")
+        build_config(GaitConfig, gait, source="network: gait")  # refuses what no gait can be
         self.actor = mlp([self.observation_size, *actor, actions], nn.ELU)
 
     def forward(self, observation: Float[Tensor, "n observation"]) -> Float[Tensor, "n actions"]:
