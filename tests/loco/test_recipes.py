@@ -1,6 +1,7 @@
 """One command per policy: every config can be trained, and a card's training is its YAML."""
 
 import re
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
