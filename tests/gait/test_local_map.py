@@ -34,3 +34,15 @@ def test_distances_and_heights_agree_with_those_of_the_world() -> None:
     np.testing.assert_allclose(
         in_torch.height(torch.from_numpy(points[..., :2])).numpy(), local.height(points[..., :2])
     )
+
+
+def test_a_wall_is_kept_off_and_no_ground_to_step_over() -> None:
+    heights = np.where(POINTS[:, 1] > 0.24, 0.4, 0.0)[None]
+    view = LocalMapView(np, heights, np.full(1, -0.4))
+    beside = np.array([[[0.5, 0.2], [0.5, 0.3]]])
+    np.testing.assert_allclose(view.crest(beside), -0.4)
+    np.testing.assert_allclose(view.height(beside), -0.4)
+    foot = np.concatenate([beside, np.full((1, 2, 1), -0.38)], -1)
+    np.testing.assert_allclose(view.clearance(foot), [[0.025, -0.075]], atol=1e-6)
+    high = LocalMapView(np, np.minimum(heights, 0.2), np.full(1, -0.4))
+    np.testing.assert_allclose(high.crest(beside), -0.2)  # a block is stepped over

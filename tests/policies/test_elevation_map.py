@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from vinl.chain.depth_cameras import DepthCameras
-from vinl.gait.local_map import POINTS
+from vinl.gait.local_map import POINTS, WALL
 from vinl.gait.proprioception import feet_in_trunk, heading_axes, into_heading_frame, motion_of
 from vinl.policies.elevation_map import NEAR, SIDE, UNSEEN, ElevationMap, MapState
 from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS, home_qpos
@@ -25,10 +25,10 @@ BAR = Boxes(np.array([[1.0, 0.0, 0.0, 0.2, 1.0, 0.0, 0.1]]))  # 0.9 to 1.1 m ahe
 HEIGHT = 0.40
 
 
-def cameras() -> DepthCameras:
+def cameras(boxes: Boxes) -> DepthCameras:
     frame = GridFrame(-4.0, -4.0, 8.0, (2, 2))
     return DepthCameras(
-        [join_meshes(heightfield_mesh(np.zeros((2, 2), np.float32), frame), box_mesh(BAR))], [0], CAMERA
+        [join_meshes(heightfield_mesh(np.zeros((2, 2), np.float32), frame), box_mesh(boxes))], [0], CAMERA
     )
 
 
@@ -49,8 +49,10 @@ def truth(qpos: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
     return (away < -margin).all(1), (away > margin).any(1)
 
 
-def walk(path: np.ndarray, speed: float, yaw_rate: float, spoil=lambda image: image) -> tuple[ElevationMap, MapState]:
-    sees, elevation = cameras(), ElevationMap(CAMERA)
+def walk(
+    path: np.ndarray, speed: float, yaw_rate: float, spoil=lambda image: image, boxes: Boxes = BAR
+) -> tuple[ElevationMap, MapState]:
+    sees, elevation = cameras(boxes), ElevationMap(CAMERA)
     state = elevation.start(1)
     motion = torch.tensor([[speed * CONTROL_DT, 0.0, 0.0, yaw_rate * CONTROL_DT]])
     for k, qpos in enumerate(path):
@@ -112,3 +114,12 @@ def test_motion_of_the_trunk_is_what_it_reckons_with() -> None:
     for _ in range(50):
         state = elevation.move(state, motion)
     assert state.pose[0].tolist() == pytest.approx([0.5 * np.sin(1.0), 0.5 * (1 - np.cos(1.0)), 1.0], abs=1e-4)
+
+
+def test_a_wall_that_is_walked_past_stays_a_wall() -> None:
+    wall = Boxes(np.array([[1.0, 0.45, 0.0, 2.0, 0.1, 0.0, 2.5]]))  # 0.4 m to the left, from x = 0
+    elevation, state = walk(poses(100, 0.5, 0.0), 0.5, 0.0, boxes=wall)
+    beside = (np.abs(POINTS[:, 0]) < 0.4) & (POINTS[:, 1] > 0.38)
+    heights = elevation.read(state)[0].numpy()
+    assert (heights[beside] > WALL).mean() > 0.9
+    assert (heights[POINTS[:, 1] < 0.3] == 0.0).all()

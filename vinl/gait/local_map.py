@@ -27,6 +27,10 @@ SHAPE = (len(X), len(Y))
 SOLID = 0.025
 """What rises so far above the floor under the robot is an obstacle [m]."""
 
+WALL = 0.28
+"""What rises so far above the floor is a wall [m]: to keep off, and no ground to step over or onto, as in
+``build_ground_map``. Blocks that these legs cross are lower; what the camera shows of a wall is as high as the camera."""
+
 _FAR = 0.25
 """Distances from obstacles are held to at most this [m]."""
 
@@ -46,10 +50,11 @@ class LocalMapView:
     def __init__(self, xp: Any, heights: Any, floor: Any) -> None:
         self._xp, self._floor = xp, floor
         grid = heights.reshape(-1, *SHAPE)
-        self._heights = grid.reshape(len(heights), -1)
+        ground = xp.where(grid > WALL, 0 * grid, grid)
+        self._heights = ground.reshape(len(heights), -1)
         reach = round(CREST_RADIUS / CELL)
         disc = [(i, j) for i in range(-reach, reach + 1) for j in range(-reach, reach + 1) if np.hypot(i, j) <= reach]
-        self._crest = self._highest(grid, disc).reshape(len(heights), -1)
+        self._crest = self._highest(ground, disc).reshape(len(heights), -1)
         self._distance, self._top = (x.reshape(len(heights), -1) for x in self._obstacles(grid))
 
     def clearance(self, points: Any) -> Any:

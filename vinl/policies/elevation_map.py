@@ -15,7 +15,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
-from vinl.gait.local_map import POINTS
+from vinl.gait.local_map import POINTS, WALL
 from vinl.gait.proprioception import into_heading_frame
 from vinl.robot.cameras import Camera
 
@@ -35,6 +35,9 @@ planner, and an angle's error lifts the floor to an obstacle."""
 
 _BLEND = 0.5
 """How far a cell moves to what the newest image shows."""
+
+_WEAR = 0.05
+"""How far a wall's cell moves to an image that shows floor there."""
 
 _FLOOR = 0.03
 """Points so near to the floor that the legs tell of are taken for floor [m], ..."""
@@ -142,7 +145,12 @@ class ElevationMap(nn.Module):
         blank = torch.full_like(state.heights, UNSEEN)
         top = blank.scatter_reduce(1, cells, torch.where(known, z, UNSEEN), "amax")
         seen = top > 0.5 * UNSEEN
-        blended = torch.where(state.heights > 0.5 * UNSEEN, state.heights + _BLEND * (top - state.heights), top)
+        # a wall that leaves the image is cut off from above, to its foot: lower points do not make it lower, and what
+        # looks like floor in its place wears it down
+        wall, rise = state.heights > WALL, top - state.heights
+        lowered = torch.where(top > _ROUGH, 0.0, _WEAR * rise)
+        rise = torch.where(wall & (rise < 0), lowered, _BLEND * rise)
+        blended = torch.where(state.heights > 0.5 * UNSEEN, state.heights + rise, top)
         return MapState(state.pose, torch.where(seen, blended, state.heights))
 
     def read(self, state: MapState) -> Float[Tensor, "n 741"]:
