@@ -29,7 +29,7 @@ SOLID = 0.025
 
 WALL = 0.28
 """What rises so far above the floor is a wall [m]: to keep off, and no ground to step over or onto, as in
-``build_ground_map``. Blocks that these legs cross are lower; what the camera shows of a wall is as high as the camera."""
+``build_ground_map``. Blocks that these legs cross are lower; of a wall the camera shows what lies below itself."""
 
 _FAR = 0.25
 """Distances from obstacles are held to at most this [m]."""
