@@ -117,8 +117,8 @@ def test_motion_of_the_trunk_is_what_it_reckons_with() -> None:
 
 
 def test_a_wall_that_is_walked_past_stays_a_wall() -> None:
-    wall = Boxes(np.array([[1.0, 0.45, 0.0, 2.0, 0.1, 0.0, 2.5]]))  # 0.4 m to the left, from x = 0
-    elevation, state = walk(poses(100, 0.5, 0.0), 0.5, 0.0, boxes=wall)
+    wall = Boxes(np.array([[1.0, 0.45, 0.0, 2.0, 0.1, 0.0, 2.5]]))  # 0.4 m to the left
+    elevation, state = walk(poses(150, 0.5, 0.0), 0.5, 0.0, boxes=wall)
     surface = (np.abs(POINTS[:, 0]) < 0.4) & np.isclose(POINTS[:, 1], 0.4)
     heights = elevation.read(state)[0].numpy()
     assert (heights[surface] > WALL).all()
