@@ -52,3 +52,7 @@ def test_description_rebuilds_the_network():
     network = MapActor(encoder=(8,), code=4, actor=(16, 8))
     again = build_network(network.describe())
     assert {k: v.shape for k, v in again.state_dict().items()} == {k: v.shape for k, v in network.state_dict().items()}
+
+
+def test_policies_and_cards_say_what_they_are_in_a_line(policy: LocomotionPolicy):
+    assert max(len(repr(policy)), len(repr(policy.card))) < 100

@@ -21,7 +21,7 @@ SCHEMA = 1
 CARD_FILE = "card.json"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PolicyCard:
     """What a policy needs to be used, and where it comes from.
 
@@ -61,6 +61,10 @@ class PolicyCard:
             raise InputError(f"schema {self.schema} is not known; this version reads schema {SCHEMA}")
         if self.samples < 0:
             raise InputError(f"samples must not be negative, got {self.samples}")
+
+    def __repr__(self) -> str:
+        network = self.network.get("class", "no network")
+        return f"PolicyCard({self.name}, {self.kind}, {network}, {self.samples:,} samples)"
 
     @property
     def observation_size(self) -> int:
