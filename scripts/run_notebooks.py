@@ -48,8 +48,10 @@ def run(path: Path) -> None:
 
 def _is_progress(output: Any) -> bool:
     """Bars and warnings of this machine."""
-    is_widget = "application/vnd.jupyter.widget-view+json" in output.get("data", {})
-    return is_widget or (output.output_type == "stream" and output.name == "stderr")
+    data = output.get("data", {})
+    is_widget = "application/vnd.jupyter.widget-view+json" in data
+    is_warning = "UserWarning: " in "".join(data.get("text/plain", ""))  # rich prints it among the outputs
+    return is_widget or is_warning or (output.output_type == "stream" and output.name == "stderr")
 
 
 if __name__ == "__main__":

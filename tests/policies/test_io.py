@@ -164,8 +164,8 @@ def test_weights_that_are_not_finite_are_refused(folder: Path):
     assert not (folder.parent / "bad").exists()
 
 
-@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device")
-def test_device_that_is_not_there(folder: Path):
+def test_device_that_is_not_there(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     with pytest.raises(InputError, match="no CUDA device is available"):
         load_policy(folder, device="cuda")
     with pytest.raises(InputError, match="unknown device 'gpu'"):

@@ -147,8 +147,8 @@ def test_bad_input_says_what_is_wrong(call, words):
         call()
 
 
-@pytest.mark.skipif(torch.cuda.is_available(), reason="needs a machine without CUDA")
-def test_no_gpu_is_a_clear_error():
+def test_no_gpu_is_a_clear_error(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     with pytest.raises(InputError, match="use device cpu"):
         DepthCamera([GROUND], LEVEL, device="cuda")
 
