@@ -51,7 +51,7 @@ def glide(config: GaitConfig, height: float, speed: float, robots: int, depth: f
         gait = aim(
             np, config, gait, plan_footholds(np, config, view, gait, velocity, command, feet), velocity, command, feet
         )
-        feet = swing_path(np, config, gait, feet, draw=0.0)
+        feet = swing_path(np, config, gait, feet)
         motion[:, 2] = gait.hip - qpos[:, 2]
         feet[..., 2] = np.where(swings(np, config, gait), feet[..., 2], FOOT_RADIUS - qpos[:, 2:3])
         ahead = feet[..., 0] - HIPS[:, 0]

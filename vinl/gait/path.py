@@ -5,20 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
-from vinl.gait.arrays import constant
 from vinl.gait.clock import swing_fraction
 from vinl.gait.config import GaitConfig
 from vinl.gait.state import GaitState
-from vinl.robot.aliengo import CONTROL_DT, KD, KP
+from vinl.robot.aliengo import CONTROL_DT
 
-_WAIT, _SETTLE = 0.12, 0.2
-"""At the beginning and at the end of a swing the foot moves up or down alone, for these fractions of it: the shank
-follows the foot, and a foot lags behind its path."""
-
-DRAW = 0.04
-"""A foot draws back by this fraction of its stride as it takes its load: its path ends so far beyond its foothold."""
+_WAIT = 0.08
+"""At both ends of a swing the foot moves up or down alone, for this fraction of it: the shank follows the foot."""
 
 _STEEP = 0.6
 """The height of the path is sin(pi s) to this power: at a tenth of the swing it is at half of its apex."""
@@ -45,8 +38,9 @@ stands; how far the hips should rise above their usual height; and how far the t
 _DELAY = CONTROL_DT / 2 + 0.015
 """From an observation to the torque that answers it [s]: half a control step, and the mean latency of the training."""
 
-LOOK_AHEAD = KD / KP + _DELAY
-"""Legs follow their targets so much later [s]: damping over stiffness, and the delay."""
+LOOK_AHEAD = 0.1
+"""Legs follow their targets so much later [s]: damping over stiffness, 0.05 s, the delay, and what it takes to gain
+speed. A policy that sees only the next step is late."""
 
 LOAD_AHEAD = _DELAY + 0.01
 """Torques act sooner than motions [s]: after the delay; and a foot that comes down needs
@@ -55,7 +49,7 @@ some of its weight at once. A leg that is given its weight 75 ms early slaps dow
 GAIT_SIZE = sum(size for _, size, _, _ in GAIT_TERMS)
 
 
-def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: float = 0.0, draw: float = DRAW) -> Any:
+def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: float = 0.0) -> Any:
     """Where each foot should be.
 
     Args:
@@ -64,7 +58,6 @@ def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: f
         feet: (n, 4, 3) middles of the feet in the heading frame [m]; a foot that stands should be where it is.
         later: how far ahead on the path to look [s]; past its touch-down a foot is at its foothold, and one that has
             lifted off by then is on its way there from where it stands.
-        draw: by which fraction of its stride a path ends beyond its foothold; 0 for feet that do not draw back.
 
     Returns:
         (n, 4, 3) [m].
@@ -73,10 +66,9 @@ def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: f
     swinging = gait.phases < fraction
     s = xp.clip(since / fraction, 0.0, 1.0)
     lift = xp.where(swinging[..., None], gait.lift, feet)
-    forth = xp.clip((s - _WAIT) / (1 - _WAIT - _SETTLE), 0.0, 1.0)
+    forth = xp.clip((s - _WAIT) / (1 - 2 * _WAIT), 0.0, 1.0)
     forth = (0.5 - 0.5 * xp.cos(math.pi * forth))[..., None]
-    beyond = constant(xp, np.array([1 + draw, 1 + draw, 1.0], np.float32), lift)
-    straight = lift + (gait.target - lift) * beyond * forth
+    straight = lift + (gait.target - lift) * forth
     bell = (xp.sin(math.pi * s) + 1e-6) ** _STEEP  # s = 1 gives a sine just below 0 in float32
     height = straight[..., 2] + (gait.apex - straight[..., 2]) * bell
     path = xp.concatenate([straight[..., :2], height[..., None]], -1)

@@ -166,8 +166,7 @@ def raibert(xp: Any, config: GaitConfig, gait: GaitState, velocity: Any, command
         (n, 4, 2) the footholds in the heading frame [m], and (n, 4) the heading that the trunk will have then [rad].
     """
     left = time_to_touch_down(xp, config, gait)
-    nominal, heading = raibert_at(xp, config, gait, (velocity + command[:, :2]) / 2, command, left)
-    return nominal + config.capture * (velocity - command[:, :2])[:, None], heading
+    return raibert_at(xp, config, gait, (velocity + command[:, :2]) / 2, command, left)
 
 
 def time_to_touch_down(xp: Any, config: GaitConfig, gait: GaitState) -> Any:

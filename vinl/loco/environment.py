@@ -392,7 +392,6 @@ class LocoEnvironment:
             path_error=steps.path_error,
             swing=steps.swing,
             middle=steps.middle,
-            late=steps.late,
             gap=steps.gap,
             blocked=steps.blocked,
             foot_speed=steps.speed,

@@ -14,9 +14,6 @@ TRACKING = ((0.3, 0.02), (0.3, 0.003), (0.4, 0.0006))
 """Weights and widths [m^2] of the foot tracking: they tell 20 cm from 10, 5 from 3 and 2 from 1. Errors
 of swinging feet are 14 cm in the beginning of a training and some 3 cm at its end."""
 
-LANDING = 3.0
-"""What the tracking of a foot about to come down counts for, against 1: its foothold is all that a stride leaves."""
-
 FAST = 0.9
 """Joint speeds beyond this fraction of the data sheet's cost."""
 
@@ -49,7 +46,7 @@ class Motion(NamedTuple):
         contacts: latched over the control step.
         landed: (n, 4) feet that touch down in this step.
         path_error: (n, 4, 3) from each foot to where its path has it [m]; 0 of feet that stand.
-        swing, middle, late: (n, 4) which feet swing by the clock, are in the middle of it, and are about to come down.
+        swing, middle: (n, 4) which feet swing by the clock, and are in the middle of it.
         gap: (n, 4) from each leg below the knee to the nearest block or wall [m].
         blocked: (n, 4) swinging feet whose foothold is on a block or beside it.
         foot_speed: (n, 4) of the feet along the ground [m/s].
@@ -71,7 +68,6 @@ class Motion(NamedTuple):
     path_error: Float[Array, "n 4 3"]
     swing: Bool[Array, "n 4"]
     middle: Bool[Array, "n 4"]
-    late: Bool[Array, "n 4"]
     gap: Float[Array, "n 4"]
     blocked: Bool[Array, "n 4"]
     foot_speed: Float[Array, "n 4"]
@@ -97,7 +93,6 @@ def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"
     foot_hit, shank_hit = m.contacts.foot_block | m.contacts.foot_wall, m.contacts.shank_block | m.contacts.shank_wall
     lack = jnp.maximum(m.path_error[..., 2], 0.0)
     tracking = sum(weight * jnp.exp(-distance2(m.path_error) / width) for weight, width in TRACKING)
-    tracking = jnp.where(m.late, LANDING * tracking, tracking)
     fast = jnp.maximum(jnp.abs(m.joint_speed) - jnp.asarray(FAST * JOINT_SPEED_LIMIT, jnp.float32), 0.0)
     slip = jnp.where(m.swing, 0.0, jnp.minimum(m.foot_speed, MAX_SLIP))
     return {

@@ -14,7 +14,6 @@ from vinl.gait.ground_view import FieldView
 from vinl.gait.local_map import POINTS
 from vinl.gait.path import swing_path
 from vinl.gait.state import (
-    FREEZE,
     GaitState,
     aim,
     feet_in_heading_frame,
@@ -40,7 +39,7 @@ class Steps(NamedTuple):
 
     Attributes:
         path_error: (n, 4, 3) from each foot to its path [m]; 0 of feet that stand.
-        swing, middle, late: (n, 4) which feet swing, are in the middle of it, and are about to come down.
+        swing, middle: (n, 4) which feet swing, and are in the middle of it.
         gap: (n, 4) from each leg below the knee to the nearest block or wall [m].
         blocked: (n, 4) swinging feet whose foothold is on a block or nearer to one than ``gait.edge``.
         speed: (n, 4) of the feet along the ground [m/s].
@@ -50,7 +49,6 @@ class Steps(NamedTuple):
     path_error: Float[Array, "n 4 3"]
     swing: Bool[Array, "n 4"]
     middle: Bool[Array, "n 4"]
-    late: Bool[Array, "n 4"]
     gap: Float[Array, "n 4"]
     blocked: Bool[Array, "n 4"]
     speed: Float[Array, "n 4"]
@@ -103,7 +101,6 @@ def go_on(
         path_error=swing_path(jnp, config, gait, feet) - feet,
         swing=swing,
         middle=swing & (progress > MIDDLE[0]) & (progress < MIDDLE[1]),
-        late=swing & (progress > FREEZE),
         gap=_leg_gap(view, body, feet),
         blocked=swing & (view.clearance(gait.target) - FOOT_RADIUS < config.edge),
         speed=jnp.hypot(feet[..., 0] - x, feet[..., 1] - y) / CONTROL_DT,
