@@ -5,7 +5,7 @@
 #
 # RUNS is where the runs go (default: runs). A run that is there already is gone on with; one that is complete is left.
 # Beside each: samples, and the minutes that they take at the speeds that the project holds itself to on one H200
-# (stages 1 and 2: 260,000 samples/s; stage 3: 70,000). Measured last, on an H100: 246,000 and 55,000.
+# (stages 1 and 2: 260,000 samples/s; stage 3: 70,000). Measured last, on an H100: 245,000 and 55,000.
 set -euo pipefail
 device="${1:-cuda}"
 runs="${RUNS:-runs}"
@@ -20,10 +20,10 @@ train() {  # name, then what a new run is started with
 }
 
 train rough --stage 1                                                          #  39 M   2.5 min
-train teacher --stage 2 --from "$runs/rough"                                   # 197 M  12.6 min
+train teacher --stage 2 --from "$runs/rough"                                   # 216 M  13.9 min
 train student --stage 3 --from "$runs/teacher"                                 #  15 M   3.5 min
 
 # baselines [paper IV-B]: the same samples in each stage
-train blind --config loco/blind --from "$runs/rough"                           # 197 M  12.6 min
-train no_pretraining --config loco/no_pretraining                              # 197 M  12.6 min
+train blind --config loco/blind --from "$runs/rough"                           # 216 M  13.9 min
+train no_pretraining --config loco/no_pretraining                              # 216 M  13.9 min
 train mlp --config loco/mlp --from "$runs/teacher"                             #  15 M   3.5 min
