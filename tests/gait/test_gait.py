@@ -57,7 +57,7 @@ def walk(steps: int, command: np.ndarray) -> tuple[GaitState, np.ndarray]:
         gait = tick(np, CONFIG, gait, motion, command, feet)
         plan = plan_footholds(np, CONFIG, None, gait, command[:, :2], command, feet)
         gait = aim(np, CONFIG, gait, plan, command[:, :2], command, feet)
-        feet = swing_path(np, CONFIG, gait, feet, draw=0.0)
+        feet = swing_path(np, CONFIG, gait, feet)
         feet[..., 2] = np.where(swings(np, CONFIG, gait), feet[..., 2], -0.4)
     return gait, feet
 
