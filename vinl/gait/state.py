@@ -165,8 +165,13 @@ def raibert(xp: Any, config: GaitConfig, gait: GaitState, velocity: Any, command
     Returns:
         (n, 4, 2) the footholds in the heading frame [m], and (n, 4) the heading that the trunk will have then [rad].
     """
-    left = time_to_touch_down(xp, config, gait)
-    return raibert_at(xp, config, gait, (velocity + command[:, :2]) / 2, command, left)
+    left, moves, rate = time_to_touch_down(xp, config, gait), (velocity + command[:, :2]) / 2, command[:, None, 2]
+    heading = rate * left
+    stance = constant(xp, stance_places(config), left)
+    about = xp.stack([-rate * stance[:, 1], rate * stance[:, 0]], -1)  # feet move with the turning, too
+    half = stance_time(xp, config, gait)[:, None, None] / 2
+    place = turn(xp, heading, stance + (command[:, None, :2] + about) * half)
+    return turn(xp, heading / 2, moves[:, None] * left[..., None]) + place, heading
 
 
 def time_to_touch_down(xp: Any, config: GaitConfig, gait: GaitState) -> Any:
@@ -174,17 +179,6 @@ def time_to_touch_down(xp: Any, config: GaitConfig, gait: GaitState) -> Any:
     phases, fraction = gait.phases, swing_fraction(xp, config, gait.period)[:, None]
     in_clock = xp.where(phases < fraction, fraction - phases, (1.0 - phases) / gait.rate + fraction)
     return in_clock * gait.period[:, None]
-
-
-def raibert_at(xp: Any, config: GaitConfig, gait: GaitState, moves: Any, command: Any, left: Any) -> tuple[Any, Any]:
-    """Raibert's footholds after times ``left`` (n, 4) [s] of moving at ``moves`` (n, 2) [m/s]; see ``raibert``."""
-    rate = command[:, None, 2]
-    heading = rate * left
-    stance = constant(xp, stance_places(config), left)
-    about = xp.stack([-rate * stance[:, 1], rate * stance[:, 0]], -1)  # feet move with the turning, too
-    half = stance_time(xp, config, gait)[:, None, None] / 2
-    place = turn(xp, heading, stance + (command[:, None, :2] + about) * half)
-    return turn(xp, heading / 2, moves[:, None] * left[..., None]) + place, heading
 
 
 def stance_time(xp: Any, config: GaitConfig, gait: GaitState) -> Any:
