@@ -163,7 +163,7 @@ _RELAX = 0.2
 _RATE_COST = 1.0
 """What the largest change of a rate costs."""
 
-_APART = 0.2
+_APART = 0.1
 """Phase by which a leg may leave the trot at a cost of 1."""
 
 LEANS = ALONG[3:-3].astype(np.float32)

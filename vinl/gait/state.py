@@ -20,7 +20,7 @@ from vinl.robot.rotation import wrap_angle, yaw_of
 START_PHASE = 0.9
 """Phase in which a robot that stands waits for its next command: no foot is about to leave the ground."""
 
-FREEZE = 0.75
+FREEZE = 0.5
 """A foot that has swung for this fraction of its swing comes down where it was going."""
 
 _RISE = 0.12
@@ -28,6 +28,9 @@ _RISE = 0.12
 
 _OVER = 0.05
 """A knee under the hip passes this far above a block [m]."""
+
+_CATCH = 0.1
+"""Footholds move by the velocity's error times this [s]: a trunk that is too fast is caught by them."""
 
 _MISSED = 0.12
 """A trunk need not catch up with more than this [m]: it may have been held up."""
@@ -171,7 +174,8 @@ def raibert(xp: Any, config: GaitConfig, gait: GaitState, velocity: Any, command
     about = xp.stack([-rate * stance[:, 1], rate * stance[:, 0]], -1)  # feet move with the turning, too
     half = stance_time(xp, config, gait)[:, None, None] / 2
     place = turn(xp, heading, stance + (command[:, None, :2] + about) * half)
-    return turn(xp, heading / 2, moves[:, None] * left[..., None]) + place, heading
+    caught = _CATCH * (velocity - command[:, :2])[:, None]
+    return turn(xp, heading / 2, moves[:, None] * left[..., None]) + place + caught, heading
 
 
 def time_to_touch_down(xp: Any, config: GaitConfig, gait: GaitState) -> Any:
