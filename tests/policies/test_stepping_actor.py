@@ -117,6 +117,17 @@ def test_steps_in_a_row_are_the_same_as_one_by_one_and_fresh_robots_forget() -> 
     assert not torch.allclose(together[3, 0], begun[0, 0])
 
 
+def test_the_map_does_not_depend_on_which_feet_stand_by_the_clock() -> None:
+    network = SteppingActor(**SMALL, camera=CAMERA.describe()).eval()  # type: ignore[arg-type]
+    vector = sensed(poses(np.random.default_rng(3), 0.0), np.zeros((N, 3)), np.zeros((N, 3)))
+    memory = network.begin(vector, network.unpack(network.initial_state(N)), torch.ones(N, dtype=torch.bool))
+    image, still = torch.full((N, CAMERA.height, CAMERA.width), 0.3), torch.zeros(N, 3)
+    swinging = memory._replace(gait=memory.gait._replace(phases=torch.full((N, 4), 0.1)))
+    seen = [network.survey(image, vector, still, then)[0] for then in (memory, swinging)]
+    assert seen[0].abs().max() > 0.05  # there is something on it
+    torch.testing.assert_close(seen[0], seen[1])
+
+
 def test_a_card_rebuilds_it_with_its_gait() -> None:
     network = SteppingActor(**SMALL, camera=CAMERA.describe(), gait={"stride": 0.5, "period": [0.5, 1.0]})  # type: ignore[arg-type]
     with torch.device("meta"):

@@ -21,7 +21,7 @@ from vinl.gait.local_map import POINTS, LocalMapView
 from vinl.gait.observation import GAIT_ROWS, SENSED_TABLE, STEPPING_TABLE
 from vinl.gait.path import GAIT_SIZE, gait_rows
 from vinl.gait.proprioception import feet_in_trunk, heading_axes, into_heading_frame, motion_of
-from vinl.gait.state import GaitState, aim, start_gait, swings, tick
+from vinl.gait.state import GaitState, aim, start_gait, tick
 from vinl.policies.depth_memory import DepthMemory, State
 from vinl.policies.elevation_map import ElevationMap, MapState
 from vinl.policies.networks import PolicyNetwork, mlp
@@ -181,13 +181,14 @@ class SteppingActor(PolicyNetwork):
         axes = heading_axes(torch, felt["projected_gravity"])
         feet = into_heading_frame(axes, feet_in_trunk(torch, felt["joint_position"]))
         now = self.elevation.move(then.map, motion_of(torch, axes, velocity, felt["base_angular_velocity"]))
-        now = self.elevation.see(now, image, axes, self.floor(then.gait, feet))
+        now = self.elevation.see(now, image, axes, self.floor(feet))
         return self.elevation.read(now), now
 
-    def floor(self, gait: GaitState, feet: Float[Tensor, "n 4 3"]) -> Float[Tensor, " n"]:
-        """Height of the floor under the feet that stand by the clock, in the heading frame [m]."""
-        stands = (~swings(torch, self.gait, gait)).float()
-        return (feet[..., 2] * stands).sum(1) / stands.sum(1).clip(min=1.0) - FOOT_RADIUS
+    @staticmethod
+    def floor(feet: Float[Tensor, "n 4 3"]) -> Float[Tensor, " n"]:
+        """Height of the floor in the heading frame [m]: that of the lowest foot. Which feet stand by the clock is not
+        enough to tell: for a moment none may, and one that is late is still in the air, or stands on a block."""
+        return feet[..., 2].amin(1) - FOOT_RADIUS
 
     def begin(self, vector: Float[Tensor, "n 45"], memory: Memory, fresh: Bool[Tensor, " n"]) -> Memory:
         """The memory before a step: robots that are fresh stand with their feet where they are."""
@@ -218,7 +219,7 @@ class SteppingActor(PolicyNetwork):
         motion = motion_of(torch, axes, said.velocity, felt["base_angular_velocity"])
         level = into_heading_frame(axes, said.velocity)[:, :2]
         gait = tick(torch, self.gait, memory.gait, motion, command, feet)
-        view = LocalMapView(torch, said.heights, self.floor(gait, feet))
+        view = LocalMapView(torch, said.heights, self.floor(feet))
         plan = plan_footholds(torch, self.gait, view, gait, level, command, feet)
         gait = aim(torch, self.gait, gait, plan, level, command, feet)
         rows = gait_rows(torch, self.gait, gait, feet) * self.rows_scale
