@@ -19,7 +19,7 @@ from rich.text import Text
 from vinl.cli.app import TRAIN_HINT
 from vinl.cli.options import parse_options
 
-PACKAGES = ("mujoco", "torch", "warp-lang", "numpy", "trimesh", "scikit-image")
+PACKAGES = ("mujoco", "torch", "warp-lang", "numpy", "trimesh", "shapely")
 TRAIN_PACKAGES = ("jax", "mujoco-mjx", "rsl-rl-lib", "gymnasium", "tensorboard")
 ABSENT = "not installed"
 

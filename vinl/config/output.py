@@ -102,7 +102,7 @@ def write_json(path: Path, data: dict[str, Any]) -> None:
     write_text(path, "{\n" + ",\n".join(body) + "\n}\n")
 
 
-_PACKAGES = ("vinl", "mujoco", "numpy", "scipy", "scikit-image", "torch", "warp-lang")
+_PACKAGES = ("vinl", "mujoco", "numpy", "scipy", "shapely", "torch", "warp-lang")
 
 
 def describe_environment() -> dict[str, str]:
