@@ -11,6 +11,7 @@ import numpy as np
 
 from vinl.gait.arrays import take_along, to_index
 from vinl.gait.ground_view import CREST_RADIUS
+from vinl.robot.aliengo import FOOT_RADIUS
 
 CELL = 0.05
 """Side of a cell [m]: that of the ground's cells in training."""
@@ -36,6 +37,14 @@ _FAR = 0.25
 
 _TOP_CELLS = 3
 """An obstacle's height counts as far as this from it [cells]: farther points are not near it in any case."""
+
+
+def floor_under(xp: Any, feet: Any) -> Any:
+    """(n,) height of the floor under robots whose feet (n, 4, 3) these are: that of the lowest foot [m].
+
+    Which feet stand by the clock is not enough to tell: for a moment none may, and one that is late is still in the
+    air, or stands on a block."""
+    return xp.amin(feet[..., 2], -1) - FOOT_RADIUS
 
 
 class LocalMapView:

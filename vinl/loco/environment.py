@@ -240,7 +240,7 @@ class LocoEnvironment:
         noisy = exact + settings.noise * (jnp.asarray(self._noise) * noise + bias)
         floor = jnp.zeros((self.num_envs, 0))
         if self.config.stage == 3:
-            floor = local_heights(self.config.gait, ground, self.simulation.frame, state.gait, body)
+            floor = local_heights(ground, self.simulation.frame, body)
         velocity = exact[:, _VELOCITY] / STEPPING_MAP_TABLE.scale[_VELOCITY]
         return Observations(noisy, exact, privileged, floor, velocity, body.qpos[:, :7] + 0.0)
 

@@ -11,7 +11,7 @@ from vinl.gait.clock import swing_fraction
 from vinl.gait.config import GaitConfig
 from vinl.gait.footholds import plan_footholds
 from vinl.gait.ground_view import FieldView
-from vinl.gait.local_map import POINTS
+from vinl.gait.local_map import POINTS, floor_under
 from vinl.gait.path import swing_path
 from vinl.gait.state import (
     GaitState,
@@ -117,12 +117,8 @@ def _leg_gap(view: FieldView, body: Body, feet: Float[Array, "n 4 3"]) -> Float[
     return jnp.minimum(foot, axis)
 
 
-def local_heights(
-    config: GaitConfig, ground: DeviceGround, frame: GridFrame, gait: GaitState, body: Body
-) -> Float[Array, "n 741"]:
-    """The ground about every robot at ``local_map.POINTS``, above the floor under the feet that stand [m]."""
+def local_heights(ground: DeviceGround, frame: GridFrame, body: Body) -> Float[Array, "n 741"]:
+    """The ground about every robot at ``local_map.POINTS``, above the floor under its feet [m]."""
     feet = feet_in_heading_frame(jnp, body.qpos)
-    stands = jnp.where(swings(jnp, config, gait), 0.0, 1.0)
-    floor = jnp.sum(stands * feet[..., 2], 1) / jnp.maximum(stands.sum(1), 1.0) - FOOT_RADIUS
     points = jnp.broadcast_to(jnp.asarray(POINTS, jnp.float32), (len(feet), *POINTS.shape))
-    return FieldView(jnp, ground.map, frame, body.qpos).height(points) - floor[:, None]
+    return FieldView(jnp, ground.map, frame, body.qpos).height(points) - floor_under(jnp, feet)[:, None]

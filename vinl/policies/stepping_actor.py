@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from vinl.config.loader import build_config
 from vinl.gait.config import GaitConfig
 from vinl.gait.footholds import plan_footholds
-from vinl.gait.local_map import POINTS, LocalMapView
+from vinl.gait.local_map import POINTS, LocalMapView, floor_under
 from vinl.gait.observation import GAIT_ROWS, SENSED_TABLE, STEPPING_TABLE
 from vinl.gait.path import GAIT_SIZE, gait_rows
 from vinl.gait.proprioception import feet_in_trunk, heading_axes, into_heading_frame, motion_of
@@ -25,7 +25,7 @@ from vinl.gait.state import GaitState, aim, start_gait, tick
 from vinl.policies.depth_memory import DepthMemory, State
 from vinl.policies.elevation_map import ElevationMap, MapState
 from vinl.policies.networks import PolicyNetwork, mlp
-from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE, FOOT_RADIUS
+from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
 from vinl.robot.cameras import Camera
 
 _GAIT_NUMBERS = (4, 1, 4, 12, 12, 4, 1, 2)
@@ -181,14 +181,8 @@ class SteppingActor(PolicyNetwork):
         axes = heading_axes(torch, felt["projected_gravity"])
         feet = into_heading_frame(axes, feet_in_trunk(torch, felt["joint_position"]))
         now = self.elevation.move(then.map, motion_of(torch, axes, velocity, felt["base_angular_velocity"]))
-        now = self.elevation.see(now, image, axes, self.floor(feet))
+        now = self.elevation.see(now, image, axes, floor_under(torch, feet))
         return self.elevation.read(now), now
-
-    @staticmethod
-    def floor(feet: Float[Tensor, "n 4 3"]) -> Float[Tensor, " n"]:
-        """Height of the floor in the heading frame [m]: that of the lowest foot. Which feet stand by the clock is not
-        enough to tell: for a moment none may, and one that is late is still in the air, or stands on a block."""
-        return feet[..., 2].amin(1) - FOOT_RADIUS
 
     def begin(self, vector: Float[Tensor, "n 45"], memory: Memory, fresh: Bool[Tensor, " n"]) -> Memory:
         """The memory before a step: robots that are fresh stand with their feet where they are."""
@@ -219,7 +213,7 @@ class SteppingActor(PolicyNetwork):
         motion = motion_of(torch, axes, said.velocity, felt["base_angular_velocity"])
         level = into_heading_frame(axes, said.velocity)[:, :2]
         gait = tick(torch, self.gait, memory.gait, motion, command, feet)
-        view = LocalMapView(torch, said.heights, self.floor(feet))
+        view = LocalMapView(torch, said.heights, floor_under(torch, feet))
         plan = plan_footholds(torch, self.gait, view, gait, level, command, feet)
         gait = aim(torch, self.gait, gait, plan, level, command, feet)
         rows = gait_rows(torch, self.gait, gait, feet) * self.rows_scale
