@@ -15,7 +15,8 @@ class GaitConfig:
     Attributes:
         stride: way of the trunk in one period, where ``period`` allows it [m]. At the distance between front and rear
             hips (0.48 m) the diagonal legs meet a bar across the path with the same phase.
-        period: least and largest period [s].
+        period: least and largest period [s]. Two legs do not carry a trunk for long: with 1.4 s it falls from step to step
+            at 0.3 m/s, and feet go where it falls.
         swing_time: of a foot [s], where ``swing_fraction`` allows it.
         swing_fraction: largest fraction of the period that a foot swings.
         stance: where the feet stand under the standing trunk, from its middle, forward and aside [m].
@@ -32,7 +33,7 @@ class GaitConfig:
     """
 
     stride: float = 0.48
-    period: tuple[float, float] = (0.6, 1.4)
+    period: tuple[float, float] = (0.6, 0.9)
     swing_time: float = 0.45
     swing_fraction: float = 0.45
     stance: tuple[float, float] = (0.24, 0.15)

@@ -12,6 +12,7 @@ from torch import nn
 
 from vinl.gait.observation import STEPPING_TABLE
 from vinl.policies.networks import StepActor
+from vinl.policies.symmetry import SymmetricMLP
 
 _FIRST_WEIGHTS = 0.003
 """Standard deviation of the last layer's weights at the start."""
@@ -43,6 +44,7 @@ class StepModel(MLPModel):
         assert isinstance(last, nn.Linear)
         nn.init.normal_(last.weight, std=_FIRST_WEIGHTS)  # it begins by standing
         nn.init.zeros_(last.bias)
+        self.mlp = SymmetricMLP(*self.mlp)
 
     def get_latent(self, obs: TensorDict, masks: Any = None, hidden_state: Any = None) -> torch.Tensor:
         """Everything before the height scan."""

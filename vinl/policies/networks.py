@@ -16,6 +16,7 @@ from vinl.config.errors import InputError
 from vinl.config.loader import build_config, closest
 from vinl.gait.config import GaitConfig
 from vinl.gait.observation import STEPPING_TABLE
+from vinl.policies.symmetry import SymmetricMLP
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE
 
 NETWORKS: dict[str, type[PolicyNetwork]] = {}
@@ -130,7 +131,7 @@ class StepActor(PolicyNetwork):
         self.keep_arguments(locals())
         self.observation_size, self.action_size = STEPPING_TABLE.size, actions
         build_config(GaitConfig, gait, source="network: gait")  # refuses what no gait can be
-        self.actor = mlp([self.observation_size, *actor, actions], nn.ELU)
+        self.actor = SymmetricMLP(*mlp([self.observation_size, *actor, actions], nn.ELU))
 
     def forward(self, observation: Float[Tensor, "n observation"]) -> Float[Tensor, "n actions"]:
         """Scaled observations in the order of ``gait.observation.STEPPING_TABLE`` to actions."""
