@@ -1,7 +1,6 @@
 """The mirror image of a robot is told the mirror image, and does the mirror image."""
 
 import numpy as np
-import pytest
 import torch
 
 from vinl.gait.config import GaitConfig

@@ -15,8 +15,8 @@ class GaitConfig:
     Attributes:
         stride: way of the trunk in one period, where ``period`` allows it [m]. At the distance between front and rear
             hips (0.48 m) the diagonal legs meet a bar across the path with the same phase.
-        period: least and largest period [s]. Two legs do not carry a trunk for long: with 1.4 s it falls from step to step
-            at 0.3 m/s, and feet go where it falls.
+        period: least and largest period [s]. Two legs do not carry a trunk for long: with
+            1.4 s feet touched more at 0.3 m/s.
         swing_time: of a foot [s], where ``swing_fraction`` allows it.
         swing_fraction: largest fraction of the period that a foot swings.
         stance: where the feet stand under the standing trunk, from its middle, forward and aside [m].

@@ -72,8 +72,8 @@ class SymmetricMLP(nn.Sequential):
         for name, values in numbers:  # no weights, but on the network's device
             self.register_buffer(name, torch.as_tensor(values, device="cpu"), persistent=False)
 
-    def forward(self, observation: Float[Tensor, "*n observation"]) -> Float[Tensor, "*n actions"]:
+    def forward(self, input: Float[Tensor, "*n observation"]) -> Float[Tensor, "*n actions"]:
         """Scaled observations to actions."""
-        mirrored = observation[..., self.seen] * self.seen_sign
-        plain, other = super().forward(torch.stack([observation, mirrored]))
+        mirrored = input[..., self.seen] * self.seen_sign
+        plain, other = super().forward(torch.stack([input, mirrored]))
         return (plain + other[..., self.done] * self.done_sign) / 2
