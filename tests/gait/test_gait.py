@@ -63,8 +63,8 @@ def walk(steps: int, command: np.ndarray) -> tuple[GaitState, np.ndarray]:
 
 
 def test_period_follows_the_commanded_speed() -> None:
-    period = wanted_period(np, CONFIG, commands((0.5, 0, 0), (2.0, 0, 0), (0, 0, 0)))
-    assert period[0] == pytest.approx(CONFIG.stride / 0.5)
+    period = wanted_period(np, CONFIG, commands((0.6, 0, 0), (2.0, 0, 0), (0, 0, 0)))
+    assert period[0] == pytest.approx(CONFIG.stride / 0.6)
     assert period[1:] == pytest.approx(list(CONFIG.period))
 
 
