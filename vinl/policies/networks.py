@@ -131,11 +131,16 @@ class StepActor(PolicyNetwork):
         self.keep_arguments(locals())
         self.observation_size, self.action_size = STEPPING_TABLE.size, actions
         build_config(GaitConfig, gait, source="network: gait")  # refuses what no gait can be
-        self.actor = SymmetricMLP(*mlp([self.observation_size, *actor, actions], nn.ELU))
+        self.actor = step_layers(actor, actions)
 
     def forward(self, observation: Float[Tensor, "n observation"]) -> Float[Tensor, "n actions"]:
         """Scaled observations in the order of ``gait.observation.STEPPING_TABLE`` to actions."""
         return self.actor(observation)
+
+
+def step_layers(hidden: Sequence[int], actions: int) -> SymmetricMLP:
+    """The layers that follow a gait: from ``STEPPING_TABLE`` through the widths ``hidden`` to ``actions``."""
+    return SymmetricMLP(*mlp([STEPPING_TABLE.size, *hidden, actions], nn.ELU))
 
 
 def mlp(sizes: Sequence[int], activation: Callable[[], nn.Module]) -> nn.Sequential:

@@ -24,8 +24,7 @@ from vinl.gait.proprioception import feet_in_trunk, heading_axes, into_heading_f
 from vinl.gait.state import GaitState, aim, start_gait, tick
 from vinl.policies.depth_memory import DepthMemory, State
 from vinl.policies.elevation_map import ElevationMap, MapState
-from vinl.policies.networks import PolicyNetwork, mlp
-from vinl.policies.symmetry import SymmetricMLP
+from vinl.policies.networks import PolicyNetwork, step_layers
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
 from vinl.robot.cameras import Camera
 
@@ -94,7 +93,7 @@ class SteppingActor(PolicyNetwork):
         self.image = None if eye is None else (eye.height, eye.width)
         self.elevation = None if eye is None else ElevationMap(eye)
         self.velocity = nn.Linear(hidden, 3)
-        self.actor = SymmetricMLP(*mlp([STEPPING_TABLE.size, *actor, actions], nn.ELU))
+        self.actor = step_layers(actor, actions)
         nn.init.normal_(self.velocity.weight, std=0.01)  # it begins with the belief that it stands
         nn.init.zeros_(self.velocity.bias)
         # no weights, but on the network's device; they have their numbers even where networks are built without any

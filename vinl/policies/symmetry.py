@@ -3,12 +3,15 @@ actions. A robot and its tasks are symmetric; a network that is not learns every
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
 from vinl.gait.observation import STEPPING_TABLE
+from vinl.robot.observation import ObservationTerm
 
 _SWAPPED = (1, 0, 3, 2)
 """The leg on the other side, in the order of ``LEGS``."""
@@ -33,47 +36,48 @@ _SIGNS: dict[str, tuple[float, ...]] = {
 """Of a term's numbers, or of those of each leg; other terms are (1,)."""
 
 
-def mirror_terms(names: tuple[str, ...], sizes: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+def mirror_terms(terms: Sequence[ObservationTerm]) -> tuple[np.ndarray, np.ndarray]:
     """Where each number of an observation comes from in its mirror image, and its sign there.
 
     Args:
-        names, sizes: of the terms; one with four times its signs has them for each leg.
+        terms: of the observation; one with four times its signs has them for each leg.
 
     Returns:
         (size,) indices and (size,) signs: the mirror image of ``x`` is ``x[indices] * signs``.
     """
     indices: list[int] = []
     signs: list[float] = []
-    for name, size in zip(names, sizes, strict=True):
-        each = _SIGNS.get(name, (1.0,))
+    for term in terms:
+        each = _SIGNS.get(term.name, (1.0,))
         first, k = len(indices), len(each)
-        legs = _SWAPPED if size == 4 * k else (0,)
+        legs = _SWAPPED if term.size == 4 * k else (0,)
         indices += [first + k * leg + i for leg in legs for i in range(k)]
         signs += each * len(legs)
-        assert len(indices) == first + size, name
+        assert len(indices) == first + term.size, term.name
     return np.array(indices), np.array(signs, np.float32)
+
+
+_ACTION = [term for term in STEPPING_TABLE if term.name == "previous_action"]
 
 
 class SymmetricMLP(nn.Sequential):
     """Layers from ``STEPPING_TABLE`` to the joints' actions: the mean of what they say and of the mirror image of what
     they say to the mirror image."""
 
-    seen: Tensor
-    seen_sign: Tensor
-    done: Tensor
-    done_sign: Tensor
+    observation_index: Tensor
+    observation_sign: Tensor
+    action_index: Tensor
+    action_sign: Tensor
 
     def __init__(self, *layers: nn.Module) -> None:
         super().__init__(*layers)
-        terms = STEPPING_TABLE.terms
-        seen = mirror_terms(tuple(t.name for t in terms), tuple(t.size for t in terms))
-        done = mirror_terms(("previous_action",), (12,))
-        numbers = ("seen", seen[0]), ("seen_sign", seen[1]), ("done", done[0]), ("done_sign", done[1])
-        for name, values in numbers:  # no weights, but on the network's device
-            self.register_buffer(name, torch.as_tensor(values, device="cpu"), persistent=False)
+        for name, terms in (("observation", STEPPING_TABLE.terms), ("action", _ACTION)):
+            index, sign = mirror_terms(terms)  # no weights, but on the network's device
+            self.register_buffer(f"{name}_index", torch.as_tensor(index, device="cpu"), persistent=False)
+            self.register_buffer(f"{name}_sign", torch.as_tensor(sign, device="cpu"), persistent=False)
 
     def forward(self, input: Float[Tensor, "*n observation"]) -> Float[Tensor, "*n actions"]:
         """Scaled observations to actions."""
-        mirrored = input[..., self.seen] * self.seen_sign
+        mirrored = input[..., self.observation_index] * self.observation_sign
         plain, other = super().forward(torch.stack([input, mirrored]))
-        return (plain + other[..., self.done] * self.done_sign) / 2
+        return (plain + other[..., self.action_index] * self.action_sign) / 2
