@@ -17,8 +17,9 @@ from vinl.gait.config import GaitConfig
 from vinl.robot.aliengo import CONTROL_DT, LINK, foot_positions, knee_positions
 from vinl.robot.rotation import wrap_angle, yaw_of
 
-START_PHASE = 0.9
-"""Phase in which a robot that stands waits for its next command: no foot is about to leave the ground."""
+START_PHASE = 0.96
+"""Phase in which a robot that stands waits for its next command: the legs that go first still bear weight; the others,
+half a period behind, have ended a swing of at most 0.46 of it."""
 
 FREEZE = 0.5
 """A foot that has swung for this fraction of its swing comes down where it was going."""
