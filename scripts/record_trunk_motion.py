@@ -61,7 +61,7 @@ def print_settings(name: str, clutter: str, sway: dict[str, Sway], execution: Ex
     print(f"  height_offset: {half * sway['height'].offset:.4f}")
     print(f"  height_shake: {sway['height'].within:.4f}")
     print("execution:")
-    print(f"  lag: {execution.lag:.2f}")
+    print(f"  speed_lag: {execution.speed_lag:.2f}\n  yaw_lag: {execution.yaw_lag:.2f}")
     print(f"  speed_gain: {spread('speed_gain')}")
     print(f"  yaw_gain: {spread('yaw_gain')}")
     for key in ("speed_noise", "yaw_noise", "side_slip"):

@@ -174,8 +174,7 @@ class Execution:
 
     Attributes:
         speed_lag, yaw_lag: time constants [s], each fitted alone.
-        lag: the one that fits both best [s].
-        speed_gain, yaw_gain: achieved over commanded, with the common lag.
+        speed_gain, yaw_gain: achieved over commanded, with these lags.
         speed_gain_spread, yaw_gain_spread: standard deviation of the gain from record to record.
         speed_noise: of a step's mean forward speed at full speed, in proportion to the speed [m/s].
         speed_noise_standing: of robots commanded to go slower than 0.1 m/s [m/s].
@@ -188,7 +187,6 @@ class Execution:
 
     speed_lag: float
     yaw_lag: float
-    lag: float
     speed_gain: float
     yaw_gain: float
     speed_gain_spread: float
@@ -270,8 +268,8 @@ def fit_execution(records: Sequence[MotionRecord]) -> Execution:
         for column, axis in enumerate((0, 2)):
             x, y = commanded(lag)[:, column], done[:, axis]
             errors[k, column] = np.mean((y - _gain(x, y) * x) ** 2)
-    lag = float(_LAGS[(errors / errors.min(0)).sum(1).argmin()])
-    x = commanded(lag)
+    lags = _LAGS[errors.argmin(0)]
+    x = np.stack([commanded(float(lag))[:, column] for column, lag in enumerate(lags)], 1)
     gains = [_gain(x[:, 0], done[:, 0]), _gain(x[:, 1], done[:, 2])]
     spread = [[_gain(x[owner == k, c], done[owner == k, a]) for k in range(len(long))] for c, a in ((0, 0), (1, 2))]
     pace = np.clip(gains[0] * x[:, 0] / MAX_SPEED, 0, 1)
@@ -282,9 +280,8 @@ def fit_execution(records: Sequence[MotionRecord]) -> Execution:
     drifts = [_gain(pace[owner == k], residual[owner == k, 2]) for k in range(len(long))]
     turning = 0.5 + 0.5 * np.maximum(pace, np.abs(gains[1] * x[:, 1]) / MAX_YAW_RATE).clip(0, 1)
     return Execution(
-        speed_lag=float(_LAGS[errors[:, 0].argmin()]),
-        yaw_lag=float(_LAGS[errors[:, 1].argmin()]),
-        lag=lag,
+        speed_lag=float(lags[0]),
+        yaw_lag=float(lags[1]),
         speed_gain=gains[0],
         yaw_gain=gains[1],
         speed_gain_spread=float(np.std(spread[0])),

@@ -54,7 +54,7 @@ def test_lag_gain_and_noise_are_found() -> None:
             poses.append(at)
         records.append(MotionRecord(np.array(poses), np.zeros((200, 3)), commands, False))
     found = fit_execution(records)
-    assert found.lag == pytest.approx(0.2, abs=0.02)
+    assert (found.speed_lag, found.yaw_lag) == pytest.approx((0.2, 0.2), abs=0.02)
     assert (found.speed_gain, found.yaw_gain) == pytest.approx((0.9, 0.8), abs=0.01)
     assert found.speed_noise == pytest.approx(0.05 * 0.9, rel=0.3)
     assert found.side_slip == pytest.approx(0.03, rel=0.2)

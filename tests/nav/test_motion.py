@@ -63,7 +63,7 @@ def test_moves_on_arcs_and_is_stopped_as_exact_geometry_says(blind, homes, lowes
     low = [Boxes(r.solid[r.solid[:, 5] < BODY_HEIGHT].astype(float)) for r in homes.records]
     walls = [shapely.union_all([shapely.Polygon(c) for c in boxes.corners()]) for boxes in low]
     shapely.prepare(walls)
-    judged = 0
+    judged, near_judged = 0, 0
     for k in range(N):
         v, w = lowest + (action[k, 0] + 1) / 2 * (1 - lowest), action[k, 1] * math.pi / 3
         poses = [follow_arc(xy[k], yaw[k], v, w, t) for t in np.linspace(0.02, 0.5, 25)]
@@ -77,7 +77,14 @@ def test_moves_on_arcs_and_is_stopped_as_exact_geometry_says(blind, homes, lowes
             assert abs(math.remainder(environment.state["yaw"][k].item() - poses[-1][1], 2 * math.pi)) < 1e-4
         else:
             np.testing.assert_allclose(there[k], xy[k], atol=1e-6)
+        end = [(there[k].astype(float), environment.state["yaw"][k].item())]
+        sweeps = [rectangles(end, 0.89 + m, 0.55 + m) for m in (-0.1, 0.1)]
+        surely, maybe = (shapely.intersects(walls[home[k]], sweep).any() for sweep in sweeps)
+        if surely == maybe:
+            near_judged += 1
+            assert bool(environment._near[k]) == surely, (k, home[k], there[k])
     assert judged > 0.7 * N and 0.1 < blocked.mean() < 0.9
+    assert near_judged > 0.6 * N and 0.1 < environment._near.mean() < 0.95
 
 
 def test_execution_lags_and_slips(blind, homes):
@@ -94,7 +101,7 @@ def test_execution_lags_and_slips(blind, homes):
 
     perfect = run(2)
     torch.testing.assert_close(perfect[0], torch.full_like(perfect[0], 0.5))
-    lagging = run(2, lag=0.3)
+    lagging = run(2, speed_lag=0.3)
     # the integral of 1 - exp(-t / 0.3) over half a second
     assert lagging[0].median().item() == pytest.approx(0.5 - 0.3 * (1 - math.exp(-0.5 / 0.3)), abs=1e-5)
     assert lagging[1].max() > lagging[0].median()

@@ -167,7 +167,7 @@ def test_with_drift_the_robot_believes_otherwise_but_arrives_where_the_goal_is(c
 
 
 def test_reward_is_progress_and_the_goal_ends_the_episode(config, homes):
-    rewards = NavRewardConfig(success=10.0, progress=1.0, slack=-0.002, collision=-0.003, scale=0.2)
+    rewards = NavRewardConfig(success=10.0, progress=1.0, slack=-0.002, collision=-0.003, near=-0.05, scale=0.2)
     config = replace(config, num_envs=200, camera=None, reward=rewards, episodes=EpisodeConfig(distance=(1.0, 6.0)))
     environment = NavEnvironment(config, homes)
     total, successes = 0.0, 0
@@ -178,9 +178,9 @@ def test_reward_is_progress_and_the_goal_ends_the_episode(config, homes):
         bearing = torch.atan2(vector[:, 2], vector[:, 1])
         action = torch.stack([torch.where(bearing.abs() < 0.6, 1.0, -1.0), (bearing / 0.52).clamp(-1, 1)], 1)
         reward, done, timeout = environment.advance(action)
-        ended, blocked = environment.ended, environment._blocked
+        ended, blocked, close = environment.ended, environment._blocked, environment._near
         success = done & ~timeout
-        expected = 0.2 * (before - environment.distance - 0.002 - 0.003 * blocked + 10.0 * success)
+        expected = 0.2 * (before - environment.distance - 0.002 - 0.003 * blocked - 0.05 * close + 10.0 * success)
         torch.testing.assert_close(reward, expected)
         near = (environment.goals() - environment.state["position"]).norm(dim=1)
         assert (near[success] < 0.325).all() and (ended.success[done] == success[done].float()).all()

@@ -151,7 +151,7 @@ class ExecutionConfig:
     """How the robot carries out a velocity; the defaults are perfect [paper].
 
     Attributes:
-        lag: the velocity approaches the commanded one with this time constant [s].
+        speed_lag, yaw_lag: forward speed and yaw rate approach the commanded ones with these time constants [s].
         speed_gain, yaw_gain: ranges of a factor of an episode on forward speed and yaw rate.
         speed_noise, yaw_noise: standard deviation of a step's mean forward speed [m/s] and yaw rate [rad/s], for a
             robot at full speed; less in proportion when slower or turning less (half of it when it stands).
@@ -162,7 +162,8 @@ class ExecutionConfig:
             what its corners meet pushes it so far back or aside at most [m]; 0: cancelled as a whole [paper].
     """
 
-    lag: float = 0.0
+    speed_lag: float = 0.0
+    yaw_lag: float = 0.0
     speed_gain: Range = (1.0, 1.0)
     yaw_gain: Range = (1.0, 1.0)
     speed_noise: float = 0.0
@@ -173,7 +174,8 @@ class ExecutionConfig:
     give_way: float = 0.0
 
     def __post_init__(self) -> None:
-        check_number("execution.lag", self.lag, 0.0, 5.0)
+        check_number("execution.speed_lag", self.speed_lag, 0.0, 5.0)
+        check_number("execution.yaw_lag", self.yaw_lag, 0.0, 5.0)
         check_range("execution.speed_gain", self.speed_gain, 0.0, 2.0)
         check_range("execution.yaw_gain", self.yaw_gain, 0.0, 2.0)
         for name in ("speed_noise", "yaw_noise", "side_slip", "yaw_drift"):
@@ -432,6 +434,9 @@ class NavRewardConfig:
         progress: for each metre that the geodesic distance shrinks.
         slack: every step.
         collision: every step that is cancelled because the robot would touch something.
+        near: every step that ends with a wall or furniture within ``margin`` of the rectangle: feet swing beside and
+            ahead of the trunk, and what they meet throws the robot.
+        margin: see ``near`` [m].
         scale: multiplies the sum.
     """
 
@@ -439,10 +444,13 @@ class NavRewardConfig:
     progress: float = 1.0
     slack: float = -0.002
     collision: float = -0.003
+    near: float = 0.0
+    margin: float = 0.12
     scale: float = 1.0
 
     def __post_init__(self) -> None:
         check_fields(self, "reward.", positive=("scale",))
+        check_number("reward.margin", self.margin, 0.0, 0.15)
 
 
 @dataclass(frozen=True)

@@ -109,15 +109,20 @@ class Measures:
 
     def __init__(self, device: torch.device) -> None:
         self._ended = torch.zeros(len(_NAMES), dtype=torch.float64, device=device)
-        self._steps = torch.zeros(4, dtype=torch.float64, device=device)
+        self._steps = torch.zeros(5, dtype=torch.float64, device=device)
 
     def add(
-        self, end: EpisodeEnd, reward: Float[Tensor, " n"], blocked: Float[Tensor, " n"], moved: Float[Tensor, " n"]
+        self,
+        end: EpisodeEnd,
+        reward: Float[Tensor, " n"],
+        blocked: Float[Tensor, " n"],
+        near: Float[Tensor, " n"],
+        moved: Float[Tensor, " n"],
     ) -> None:
         """Count a step of all robots."""
         rows = torch.stack([end.counted.float(), *(getattr(end, name) for name in _NAMES[1:])])
         self._ended += torch.where(end.counted, rows, 0.0).sum(1, dtype=torch.float64)
-        step = torch.stack([torch.ones_like(reward), reward, blocked, moved])
+        step = torch.stack([torch.ones_like(reward), reward, blocked, near, moved])
         self._steps += step.sum(1, dtype=torch.float64)
 
     def read(self, unplaced: Tensor) -> dict[str, float]:
@@ -129,14 +134,15 @@ class Measures:
         values = torch.cat([self._ended, self._steps, unplaced.sum(dtype=torch.float64)[None]]).tolist()
         for sums in (self._ended, self._steps, unplaced):
             sums.zero_()
-        ended, steps = dict(zip(_NAMES, values[: len(_NAMES)], strict=True)), max(values[-5], 1.0)
+        ended, steps = dict(zip(_NAMES, values[: len(_NAMES)], strict=True)), max(values[-6], 1.0)
         episodes = ended.pop("episodes")
         measures = {"episodes": episodes}
         if episodes > 0:
             measures |= {name: value / episodes for name, value in ended.items()}
         return measures | {
-            "reward": values[-4] / steps,
-            "blocked": values[-3] / steps,
+            "reward": values[-5] / steps,
+            "blocked": values[-4] / steps,
+            "near": values[-3] / steps,
             "step_length": values[-2] / steps,
             "unplaced": values[-1],
         }
@@ -204,7 +210,7 @@ class NavEnvironment:
         self.state |= {name: self._zeros(n) for name in counts}
         self.state["action"] = self._zeros(n, 2)
         self.state["chance"] = self._zeros(2, dtype=torch.int32)
-        self._moved, self._blocked, self._straight = (self._zeros(n) for _ in range(3))
+        self._moved, self._blocked, self._near, self._straight = (self._zeros(n) for _ in range(4))
         self._camera_pose = self._zeros(n, 3), self._zeros(n, 3, 3)
         self._sensor: DepthSensor | None = None
         if self.camera is not None:
@@ -225,6 +231,7 @@ class NavEnvironment:
             "unplaced": wp.from_torch(self.state["unplaced"]),
             "moved": wp.from_torch(self._moved),
             "blocked": wp.from_torch(self._blocked),
+            "near": wp.from_torch(self._near),
             "straight": wp.from_torch(self._straight),
             "chosen": wp.from_torch(self._chosen),
             "camera": wp.from_torch(self._camera_pose[0], dtype=wp.vec3),
@@ -273,9 +280,9 @@ class NavEnvironment:
     def read_measures(self) -> dict[str, float]:
         """Means over the episodes that ended since the last call (``success``, ``spl``, ``soft_spl``, ``collisions``,
         ``steps``, ``path`` and ``start_distance``, ``end_distance`` [m], fractions that were ``stuck``, ``looping``,
-        ``out_of_time``; absent if none ended), their number ``episodes``; over all steps ``reward``, the fraction
-        ``blocked``, ``step_length`` [m]; and how many were ``unplaced``: started off the range of distances, because no
-        start within it was found. The host waits here."""
+        ``out_of_time``; absent if none ended), their number ``episodes``; over all steps ``reward``, the fractions
+        ``blocked`` and ``near`` (a wall or furniture within ``reward.margin``), ``step_length`` [m]; and how many were
+        ``unplaced``: started off the range of distances, because no start within it was found. The host waits here."""
         return self._measures.read(self.state["unplaced"])
 
     def save_state(self) -> dict[str, Any]:
@@ -318,7 +325,7 @@ class NavEnvironment:
         self._launch(
             move_robots,
             self.num_envs,
-            [self.homes.homes, self._rules, "chance", "action", self._robots, "moved", "blocked", "straight"],
+            [self.homes.homes, self._rules, "chance", "action", self._robots, "moved", "blocked", "near", "straight"],
         )
         if self._odometry is not None:
             self._odometry.advance(place, state["position"])
@@ -332,10 +339,10 @@ class NavEnvironment:
         timeout = (state["steps"] >= episodes.steps) & ~success
         done = success | timeout
         reward = rules.progress * (before - state["distance"]) + rules.success * success
-        reward += rules.slack + rules.collision * self._blocked
+        reward += rules.slack + rules.collision * self._blocked + rules.near * self._near
         reward = rules.scale * reward
         self.ended = end_episodes(state, done, success)
-        self._measures.add(self.ended, reward, self._blocked, self._moved)
+        self._measures.add(self.ended, reward, self._blocked, self._near, self._moved)
         self._observation = None
         return reward, done, timeout
 

@@ -56,7 +56,8 @@ class Rules:
     least: wp.float32  # distance at the start
     most: wp.float32
     start_speed: wp.vec2
-    lag: wp.float32
+    speed_lag: wp.float32
+    yaw_lag: wp.float32
     speed_gain: wp.vec2
     yaw_gain: wp.vec2
     speed_noise: wp.float32
@@ -65,6 +66,7 @@ class Rules:
     yaw_drift: wp.float32
     execution_amplitude: wp.vec2
     give_way: wp.float32
+    margin: wp.float32
     sees_motion: wp.int32
     tilt: wp.vec2
     tilt_offset: wp.vec2
@@ -94,6 +96,7 @@ def write_rules(config: NavConfig) -> Any:
         "most": episodes.distance[1],
         "start_speed": episodes.start_speed,
         "execution_amplitude": execution.amplitude,
+        "margin": config.reward.margin,
         "sees_motion": int(config.previous != "action"),
         "tilt_offset": motion.offset,
         "tilt_shake": motion.shake,
@@ -112,6 +115,16 @@ def mix(between: wp.vec2, fraction: wp.float32) -> wp.float32:
     """From one end of a range to the other. Draws stay in the kernels: a function gets a copy of the random state, and
     what follows it would draw the same numbers again."""
     return between[0] + (between[1] - between[0]) * fraction
+
+
+@wp.func
+@no_type_check
+def left_of(period: wp.float32, lag: wp.float32) -> wp.vec2:
+    """How much of a step's old velocity is left with a first-order lag: in its mean, and at its end."""
+    if lag <= 0.0:
+        return wp.vec2(0.0, 0.0)
+    last = wp.exp(-period / lag)
+    return wp.vec2((1.0 - last) * lag / period, last)
 
 
 @wp.func
@@ -165,13 +178,15 @@ def move_robots(
     robots: Robots,
     moved: wp.array(dtype=wp.float32),
     blocked: wp.array(dtype=wp.float32),
+    near: wp.array(dtype=wp.float32),
     straight: wp.array(dtype=wp.float32),
 ):
     """One step: constant speed, slip and yaw rate over the period. If the swept rectangle touches, it is cancelled as a
     whole, or all but its turn (``Rules.give_way``).
 
-    Writes pose, velocity and distance of the robots, the path moved [m], 1 where it touched, and the straight distance
-    to the goal [m]. Where the goal cannot be reached from the new place, the distance stays as it was.
+    Writes pose, velocity and distance of the robots, the path moved [m], 1 where it touched, 1 where something lies
+    within the margin of where it ends, and the straight distance to the goal [m]. Where the goal cannot be reached from
+    the new place, the distance stays as it was.
     """
     n = wp.tid()
     state = wp.rand_init(seed[0] + 4 * seed[1], n)
@@ -181,16 +196,13 @@ def move_robots(
     a1 = wp.clamp(action[n][1], -1.0, 1.0)
     v_command = (rules.min_speed + 0.5 * (a0 + 1.0) * (rules.max_speed - rules.min_speed)) * gain[0]
     w_command = a1 * rules.max_yaw_rate * gain[1]
-    # a first-order lag: the mean over the period, and what is left of the old velocity at its end
-    mean = float(0.0)
-    last = float(0.0)
-    if rules.lag > 0.0:
-        last = wp.exp(-rules.period / rules.lag)
-        mean = (1.0 - last) * rules.lag / rules.period
-    v = v_command + (robots.speed[n] - v_command) * mean
-    w = w_command + (robots.yaw_rate[n] - w_command) * mean
-    v_end = v_command + (robots.speed[n] - v_command) * last
-    w_end = w_command + (robots.yaw_rate[n] - w_command) * last
+    # first-order lags: the mean over the period, and the velocity at its end
+    v_left = left_of(rules.period, rules.speed_lag)
+    w_left = left_of(rules.period, rules.yaw_lag)
+    v = v_command + (robots.speed[n] - v_command) * v_left[0]
+    w = w_command + (robots.yaw_rate[n] - w_command) * w_left[0]
+    v_end = v_command + (robots.speed[n] - v_command) * v_left[1]
+    w_end = w_command + (robots.yaw_rate[n] - w_command) * w_left[1]
     pace = wp.abs(v) / rules.max_speed
     noisy = gain[3] * pace
     v = v + rules.speed_noise * wp.randn(state) * noisy
@@ -252,6 +264,8 @@ def move_robots(
     distance = read_distance(homes, home, robots.goal[n], p)
     if distance < NOWHERE:
         robots.distance[n] = distance
+    room = 2.0 * rules.margin
+    near[n] = wp.where(touches(homes, home, p, heading, rules.length + room, rules.width + room), 1.0, 0.0)
     straight[n] = wp.length(homes.goals[home, robots.goal[n]] - p)
 
 
