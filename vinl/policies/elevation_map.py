@@ -154,11 +154,21 @@ class ElevationMap(nn.Module):
         return MapState(state.pose, torch.where(seen, blended, state.heights))
 
     def read(self, state: MapState) -> Float[Tensor, "n 741"]:
-        """Heights above the floor at the planner's points [m]; what was never seen is level floor."""
+        """Heights above the floor at the planner's points [m]; what was never seen is level floor.
+
+        A cell of the planner is as high as three of its four quarters: by the highest one, every edge would lie up to
+        half a cell farther out than it does, and a bar would be too deep to straddle. Where two were not seen, or a
+        wall stands, the highest counts.
+        """
         points = self.points.expand(len(state.pose), -1, -1)
         found = torch.gather(state.heights, 1, self._index(state.pose, points))
-        highest = found.reshape(len(found), -1, len(_QUARTERS)).amax(-1)
-        return torch.where((highest.abs() < _ROUGH) | (highest < 0.5 * UNSEEN), 0.0, highest)
+        quarters = found.reshape(len(found), -1, len(_QUARTERS))
+        highest = quarters.amax(-1)
+        one, other = quarters[..., :2], quarters[..., 2:]
+        lower = torch.maximum(one.amin(-1), other.amin(-1))
+        third = torch.minimum(torch.minimum(one.amax(-1), other.amax(-1)), lower)
+        height = torch.where((third < 0.5 * UNSEEN) | (highest > WALL), highest, third)
+        return torch.where((height.abs() < _ROUGH) | (height < 0.5 * UNSEEN), 0.0, height)
 
     @staticmethod
     def _cell_of(xy: Tensor) -> Tensor:
