@@ -79,6 +79,18 @@ def test_a_bar_stays_where_it_lies(speed: float, yaw_rate: float) -> None:
     assert (heights[off] == 0).mean() > 0.97
 
 
+def test_a_bar_is_as_deep_as_it_is() -> None:
+    """On average over where it lies among the cells: a bar that looks deeper is not straddled."""
+    counted, true = 0, 0
+    for steps in range(70, 100, 2):  # it moves by 1.6 cm among cells of 5 cm
+        path = poses(steps, 0.4, 0.0)
+        elevation, state = walk(path, 0.4, 0.0)
+        middle = np.abs(POINTS[:, 1]) < 0.3
+        counted += (elevation.read(state)[0].numpy()[middle] > 0.05).sum()
+        true += truth(path[-1], 0.0)[0][middle].sum()
+    assert 0.85 * true < counted < 1.12 * true
+
+
 def test_pixels_without_a_return_and_a_tilted_camera_change_little() -> None:
     random = torch.Generator().manual_seed(0)
     path = poses(100, 0.5, 0.0)
