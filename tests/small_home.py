@@ -6,7 +6,7 @@ import torch
 
 from vinl.chain.records import EpisodeRecord
 from vinl.policies.card import locomotion_card
-from vinl.policies.networks import MapActor
+from vinl.policies.networks import StepActor
 from vinl.policies.policy import LocomotionPolicy
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import FloorPlan, assemble_floorplan, frame_around
@@ -33,9 +33,9 @@ def two_rooms() -> FloorPlan:
     return assemble_floorplan("two_rooms", "test", Boxes(np.array(walls)), table, inside, frame)
 
 
-def small_network() -> MapActor:
+def small_network() -> StepActor:
     """With layers of 8 a row's place in the batch would matter to the last bits (AMD EPYC, torch 2.13)."""
-    return MapActor(encoder=(16,), code=8, actor=(16,))
+    return StepActor(actor=(16,))
 
 
 @pytest.fixture(scope="session")
@@ -45,7 +45,7 @@ def standing() -> LocomotionPolicy:
     with torch.no_grad():
         for parameter in network.parameters():
             parameter.zero_()
-    return LocomotionPolicy(network, locomotion_card("standing", network.describe()))
+    return LocomotionPolicy(network, locomotion_card("standing", network.describe(), gait={}))
 
 
 @pytest.fixture(scope="session")
@@ -53,4 +53,4 @@ def trotting() -> LocomotionPolicy:
     """An untrained policy: it moves its legs somehow, so that two runs have something to agree on."""
     torch.manual_seed(0)
     network = small_network()
-    return LocomotionPolicy(network, locomotion_card("trotting", network.describe()))
+    return LocomotionPolicy(network, locomotion_card("trotting", network.describe(), gait={}))

@@ -141,6 +141,6 @@ def test_a_learned_navigator_that_turns_to_nan(two_rooms: FloorPlan, standing: L
 def test_a_camera_that_the_robot_lacks(two_rooms: FloorPlan, change: dict, words: str) -> None:
     camera = replace(LOCOMOTION_CAMERA, height=4, width=6, **change)
     network = TinyWalker()
-    card = locomotion_card("walker", network.describe(), scan=False, camera=camera.describe())
+    card = locomotion_card("walker", network.describe(), camera=camera.describe())
     with pytest.raises(InputError, match=words):
         evaluate([two_rooms], DepthPolicy(network, card), "oracle", episodes=1, seeds=1, config=SHORT)

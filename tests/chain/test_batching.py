@@ -11,12 +11,13 @@ from vinl.benchmark.evaluate import evaluate
 from vinl.chain.batching import BatchedPolicy, batch_policy, is_steady
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.navigators.learned import LearnedNavigator
+from vinl.gait.observation import SENSED_TABLE
 from vinl.policies.card import locomotion_card, navigation_card
-from vinl.policies.depth_actor import DepthActor
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.policies.nav_actor import NavActor
 from vinl.policies.policy import LocomotionPolicy
+from vinl.policies.stepping_actor import SteppingActor
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
 from vinl.world.floorplan import FloorPlan
 
@@ -27,9 +28,9 @@ N, STEPS = 21, 4
 def student() -> DepthPolicy:
     """The student's network with random weights."""
     torch.manual_seed(0)
-    network = DepthActor()
-    camera = LOCOMOTION_CAMERA.describe()
-    return DepthPolicy(network, locomotion_card("student", network.describe(), scan=False, camera=camera))
+    camera = replace(LOCOMOTION_CAMERA, missing="plane").describe()
+    network = SteppingActor(camera)
+    return DepthPolicy(network, locomotion_card("student", network.describe(), table=SENSED_TABLE, camera=camera))
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +75,7 @@ def test_batches_say_what_the_policy_says(student: DepthPolicy) -> None:
     student.reset(5)
     batched.reset(5)
     for step in range(6):
-        vector = rng.normal(size=(5, 48)).astype(np.float32)
+        vector = rng.normal(size=(5, 45)).astype(np.float32)
         depth = torch.as_tensor(rng.uniform(0, 2, (5, 36, 64)), dtype=torch.float32)
         np.testing.assert_allclose(batched.act(vector, depth), student.act(vector, depth), atol=1e-5)
         if step == 2:
@@ -85,7 +86,7 @@ def test_batches_say_what_the_policy_says(student: DepthPolicy) -> None:
 
 def test_those_not_asked_keep_their_memory_and_answer(student: DepthPolicy) -> None:
     rng = np.random.default_rng(0)
-    vector, depth = rng.normal(size=(3, 48)).astype(np.float32), torch.zeros(3, 36, 64)
+    vector, depth = rng.normal(size=(3, 45)).astype(np.float32), torch.zeros(3, 36, 64)
     alone, some = BatchedPolicy(student), BatchedPolicy(student)
     for policy in (alone, some):
         policy.reset(3)

@@ -40,7 +40,7 @@ def teacher() -> Listening:
     """Random weights; stands nearly still."""
     torch.manual_seed(0)
     network: PolicyNetwork = StepActor(actor=[16])
-    return Listening(network, locomotion_card("steps", network.describe(), scan=False, gait=asdict(GaitConfig())))
+    return Listening(network, locomotion_card("steps", network.describe(), gait=asdict(GaitConfig())))
 
 
 @pytest.fixture

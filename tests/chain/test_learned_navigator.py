@@ -38,7 +38,7 @@ def make_walker() -> DepthPolicy:
     torch.manual_seed(1)
     network = TinyWalker()
     camera = replace(LOCOMOTION_CAMERA, height=4, width=6)
-    return DepthPolicy(network, locomotion_card("walker", network.describe(), scan=False, camera=camera.describe()))
+    return DepthPolicy(network, locomotion_card("walker", network.describe(), camera=camera.describe()))
 
 
 def test_goal_and_last_action_in_velocities_out(two_rooms: FloorPlan) -> None:

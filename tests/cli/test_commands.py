@@ -11,15 +11,15 @@ from vinl.cli.app import main
 from vinl.cli.policies import count
 from vinl.policies.card import locomotion_card
 from vinl.policies.io import WEIGHTS_FILE, save_policy
-from vinl.policies.networks import MapActor
+from vinl.policies.networks import StepActor
 
 
 @pytest.fixture
 def policy(tmp_path: Path) -> Path:
     torch.manual_seed(0)
-    network = MapActor(encoder=(8,), code=4, actor=(16,))
+    network = StepActor(actor=(16,))
     figures = {"flat": {"falls": 0.0, "linear_velocity_rmse": 0.0812345}}
-    card = locomotion_card("rough", network.describe(), samples=128_000_000, evaluation=figures)
+    card = locomotion_card("rough", network.describe(), gait={}, samples=128_000_000, evaluation=figures)
     return save_policy(tmp_path / "assets" / "policies" / "rough", network, card)
 
 
@@ -32,14 +32,14 @@ def shipped(policy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
 def test_table_of_policies(shipped: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["policies"]) == 0
     said = capsys.readouterr().out
-    for word in ("rough", "locomotion", "height scan", "128 M"):
+    for word in ("rough", "locomotion", "the true ground", "128 M"):
         assert word in said
 
 
 def test_one_card(shipped: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["policies", "vinl/rough"]) == 0
     said = capsys.readouterr().out
-    assert "height_scan (187)" in said and "action scale [rad]" in said and "MapActor" in said
+    assert "foothold (8)" in said and "action scale [rad]" in said and "StepActor" in said
     assert main(["policies", str(shipped), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["samples"] == 128_000_000
 

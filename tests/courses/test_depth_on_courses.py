@@ -9,27 +9,24 @@ import torch
 from vinl.chain.depth_cameras import DepthCameras
 from vinl.courses.evaluate import compare_locomotors
 from vinl.courses.grounds import GroundConfig, build_ground
-from vinl.policies.card import PolicyCard
-from vinl.policies.depth_actor import DepthActor
+from vinl.gait.observation import SENSED_TABLE
+from vinl.policies.card import locomotion_card
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.policy import LocomotionPolicy
-from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP, home_qpos
+from vinl.policies.stepping_actor import SteppingActor
+from vinl.robot.aliengo import home_qpos
 from vinl.robot.cameras import LOCOMOTION_CAMERA
-from vinl.robot.observation import PROPRIOCEPTION
 from vinl.world.grid import GridFrame, HeightField
 
 FRAME = GridFrame(-2.0, -2.0, 0.1, (41, 41))
 
 
-@pytest.mark.parametrize("vision", ["cnn", "none"])
-def test_students_walk_beside_others(vision: str, trotting: LocomotionPolicy) -> None:
+@pytest.mark.parametrize("sees", [True, False])
+def test_students_walk_beside_others(sees: bool, trotting: LocomotionPolicy) -> None:
     torch.manual_seed(0)
-    network = DepthActor(vision=vision, hidden=8, layers=1, actor=(16,))
-    action = {"scale": ACTION_SCALE, "default_pose": DEFAULT_POSE.tolist(), "kp": KP, "kd": KD}
-    camera = LOCOMOTION_CAMERA.describe() if vision == "cnn" else None
-    student = DepthPolicy(
-        network, PolicyCard("locomotion", vision, network.describe(), PROPRIOCEPTION.describe(), action, camera)
-    )
+    camera = replace(LOCOMOTION_CAMERA, missing="plane").describe() if sees else None
+    network = SteppingActor(camera, hidden=8, layers=1, actor=(16,))
+    student = DepthPolicy(network, locomotion_card("mine", network.describe(), table=SENSED_TABLE, camera=camera))
     results = compare_locomotors([student, trotting], "blocks", 2, 0.4)
     assert [len(r.records) for r in results] == [2, 2]
     assert results[0].records[0].steps == 20

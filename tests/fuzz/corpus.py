@@ -7,7 +7,7 @@ import io
 import json
 import shutil
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -82,12 +82,15 @@ def _plans() -> Iterator[Reader]:
 
 
 def _policies() -> Iterator[Reader]:
+    from vinl.gait.config import GaitConfig
     from vinl.policies.card import CARD_FILE, locomotion_card
     from vinl.policies.io import WEIGHTS_FILE, load_policy, save_policy
-    from vinl.policies.networks import MapActor
+    from vinl.policies.networks import StepActor
 
-    network = MapActor(encoder=(8,), code=4, actor=(8,))
-    folder = save_policy("fuzz-policy", network, locomotion_card("small", network.describe()))
+    network = StepActor(actor=(8,))
+    folder = save_policy(
+        "fuzz-policy", network, locomotion_card("small", network.describe(), gait=asdict(GaitConfig()))
+    )
     weights, card = ((folder / name).read_bytes() for name in (WEIGHTS_FILE, CARD_FILE))
     yield Reader(
         "card", {CARD_FILE: card}, mutate.mutate_json, lambda p: load_policy(p.parent), {WEIGHTS_FILE: weights}

@@ -16,16 +16,19 @@ import vinl.gym
 from vinl.chain import controller
 from vinl.chain.batching import batch_policy
 from vinl.chain.config import EvaluationConfig
+from vinl.chain.ground_reader import GaitReader, ScanReader, map_plan
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.chain.records import plain_record
 from vinl.config.errors import InputError
 from vinl.config.loader import load_config
+from vinl.gait.observation import insert_gait
 from vinl.gym.home import JOINT_REACH, RANGE, HomeEnv
 from vinl.nav.config import NavConfig
-from vinl.policies.card import navigation_table
+from vinl.policies.card import find_gait, navigation_table
 from vinl.policies.policy import LocomotionPolicy
 from vinl.robot.aliengo import ACTION_SCALE
 from vinl.robot.observation import observe
+from vinl.world.boxes import Blocks
 
 ID, PLAN = "vinl/Home-v0", "harbour_flat"
 NEAR = EvaluationConfig(min_distance=2.0)
@@ -118,7 +121,8 @@ def test_joints_walk_the_episode_that_evaluate_walks(monkeypatch: pytest.MonkeyP
     """A locomotor driven from outside, by actions that lose nothing: the reach is a power of two of its scale."""
     rules = replace(NEAR, time_limit=2.0)
     policy = vinl.load_policy("no_pretraining")
-    assert isinstance(policy, LocomotionPolicy) and JOINT_REACH / ACTION_SCALE == 16
+    gait = find_gait(policy.card)
+    assert gait is not None and isinstance(policy, LocomotionPolicy) and JOINT_REACH / ACTION_SCALE == 16
     legs = batch_policy(policy)
     legs.reset(1)
     asked = []
@@ -136,10 +140,15 @@ def test_joints_walk_the_episode_that_evaluate_walks(monkeypatch: pytest.MonkeyP
         cameras={},
     )
     observation, _ = env.reset(options={"plan": PLAN})
+    trip, blocks = env.trip, [Blocks.empty()]
+    assert trip is not None
+    ground, reader = ScanReader(plan, blocks).read(trip.qpos), GaitReader(gait, map_plan(plan, blocks))
+    wanted = observe(np, trip.qpos, trip.qvel, env._command, np.zeros((1, 12)), ground)[0, 48:]
+    np.testing.assert_array_equal(observation["height_scan"], wanted.astype(np.float32))
     out, k = False, 0
     while not out:
-        seen = np.concatenate([observation["proprioception"], observation["height_scan"]])
-        action = legs.act(seen[None])[0]
+        rows = reader.read(trip.qpos, trip.qvel, env._command)
+        action = legs.act(insert_gait(np, observation["proprioception"][None], rows))[0]
         np.testing.assert_array_equal(action, asked[k][0])
         observation, _, over, out, info = env.step(action / np.float32(16))
         k += 1

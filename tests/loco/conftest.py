@@ -47,7 +47,7 @@ def small_config() -> LocoConfig:
 def walker(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An untrained policy that knows the gait of the trainings."""
     network = StepActor()
-    card = locomotion_card("walker", network.describe(), scan=False, gait=asdict(GaitConfig()))
+    card = locomotion_card("walker", network.describe(), gait=asdict(GaitConfig()))
     return save_policy(tmp_path_factory.mktemp("policies") / "walker", network, card)
 
 

@@ -101,9 +101,9 @@ def test_policies_that_do_not_fit_are_refused(tmp_path, config, walker, capsys):
     folders = {name: tmp_path / name for name in ("small", "soft", "other", "eyes")}
     gait = asdict(GaitConfig())
     network = StepActor(actor=(8,))
-    save_policy(folders["small"], network, locomotion_card("small", network.describe(), scan=False, gait=gait))
+    save_policy(folders["small"], network, locomotion_card("small", network.describe(), gait=gait))
     network = StepActor()
-    card = locomotion_card("soft", network.describe(), scan=False, gait=gait)
+    card = locomotion_card("soft", network.describe(), gait=gait)
     save_policy(folders["soft"], network, replace(card, action={**card.action, "kp": 20.0}))
     save_policy(folders["other"], network, replace(card, gait=gait | {"stride": 0.6}))
     shutil.copytree(find_policy("rough"), folders["eyes"])
@@ -111,7 +111,7 @@ def test_policies_that_do_not_fit_are_refused(tmp_path, config, walker, capsys):
     (folders["eyes"] / "card.json").write_text(json.dumps({**data, "kind": "navigation"}))
     words = {"small": "actor [8]", "soft": "kp 20", "other": "gait.stride=0.6", "eyes": "navigation"}
     cases = [(str(folders[name]), text) for name, text in words.items()]
-    cases += [("none", "unknown"), ("blind", "without the gait"), ("no_pretraining", "without the gait")]
+    cases += [("none", "unknown"), ("loco", "SteppingActor"), ("nav", "navigation policy")]
     for policy, text in cases:
         for stage in ("2", "3"):
             if stage == "3" and policy == str(folders["small"]):

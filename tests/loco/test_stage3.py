@@ -3,7 +3,7 @@
 import json
 import math
 import shutil
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import jax
 import numpy as np
@@ -16,7 +16,7 @@ from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.config.loader import load_config
 from vinl.gait.config import GaitConfig
-from vinl.gait.observation import SENSED_TABLE, STEPPING_MAP_TABLE, STEPPING_TABLE
+from vinl.gait.observation import SENSED_TABLE, STEPPING_MAP_TABLE
 from vinl.loco import student as stage3
 from vinl.loco.config import LocoConfig
 from vinl.loco.distillation import Distillation
@@ -25,7 +25,7 @@ from vinl.loco.student_config import DistillationConfig, NetworkConfig, StudentC
 from vinl.policies.card import locomotion_card
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy, save_policy
-from vinl.policies.networks import MapActor, StepActor
+from vinl.policies.networks import StepActor
 from vinl.rl.stopwatch import Stopwatch
 
 SMALL = ["num_envs=16", *BLOCK_TILES, *SMALL_STUDENT]
@@ -103,13 +103,11 @@ def test_a_robot_that_goes_wrong_is_set_back_and_saved(tmp_path, compiled_once, 
 
 
 def test_policies_that_cannot_teach_are_refused(tmp_path, capsys):
-    scanning, student, gait = tmp_path / "scanning", tmp_path / "student", asdict(GaitConfig())
-    network = MapActor(STEPPING_TABLE.size, actor=(8,))
-    save_policy(scanning, network, locomotion_card("scanning", network.describe(), gait=gait))
+    student = tmp_path / "student"
     sees = stage3.build_student(StudentConfig(), StepActor(), GaitConfig())
     camera = StudentConfig().camera.record().describe()
     save_policy(student, sees, locomotion_card("student", sees.describe(), table=SENSED_TABLE, camera=camera))
-    for folder, words in ((scanning, "MapActor"), (student, "without the gait"), (tmp_path / "none", "unknown")):
+    for folder, words in (("nav", "navigation policy"), (student, "a student itself"), (tmp_path / "none", "unknown")):
         command = ["train-loco", "--stage", "3", "--device", "cpu", "--from", str(folder), "--out", "out"]
         assert main(command) == 2
         error = capsys.readouterr().err

@@ -1,6 +1,7 @@
 """Functions of one's own in the chain: what they are given, what becomes of their answers."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,13 +44,17 @@ def test_navigator_sees_and_remembers() -> None:
 
 
 def test_function_around_a_policy_walks_as_the_policy() -> None:
-    walker = vinl.load_policy("no_pretraining")
+    walker = vinl.load_policy("loco")
 
-    def same(observation: np.ndarray) -> torch.Tensor:
-        assert observation.dtype == np.float32 and observation.shape == (1, 235)
-        return torch.as_tensor(walker.act(observation))
+    class Same:
+        def reset(self, which: Any) -> None:
+            walker.reset(which)
 
-    own = vinl.walk(PLAN, vinl.as_locomotor(same, scan=True), config=SHORT).record
+        def __call__(self, observation: np.ndarray, depth: torch.Tensor) -> torch.Tensor:
+            assert observation.dtype == np.float32 and observation.shape == (1, 48)
+            return torch.as_tensor(walker.act(observation[:, 3:], depth))  # it measures no velocity
+
+    own = vinl.walk(PLAN, vinl.as_locomotor(Same(), walker.camera), config=SHORT).record
     shipped = vinl.walk(PLAN, walker, config=SHORT).record
     assert own.distance_m == pytest.approx(shipped.distance_m, abs=0.02)  # the last bits of a network vary
 

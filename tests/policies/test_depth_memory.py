@@ -85,13 +85,13 @@ def test_unknown_parts_are_refused():
         small("cnn", "gru")
 
 
-def test_the_student_is_rebuilt_from_its_description():
-    network = build_network({"class": "DepthActor", "vision": "none", "hidden": 8, "actor": [16, 8]})
+def test_the_navigator_is_rebuilt_from_its_description():
+    network = build_network({"class": "NavActor", "vision": "none", "hidden": 8})
     again = build_network(network.describe())
     again.load_state_dict(network.state_dict())
-    vector, fresh = torch.randn(3, 2, 48), torch.zeros(3, 2).bool()
+    vector, fresh = torch.randn(3, 2, 5), torch.zeros(3, 2).bool()
     action, state = again(None, vector, again.initial_state(2), fresh)
-    assert action.shape == (3, 2, 12) and state[0].shape == (2, 2, 8) and again.image is None
+    assert action.shape == (3, 2, 2) and state[0].shape == (2, 2, 8) and again.image is None
     for wrong in ({"vision": "eye"}, {"hidden": "wide"}, {"hidden": 0}):
         with pytest.raises(InputError):
-            build_network({"class": "DepthActor", **wrong})
+            build_network({"class": "NavActor", **wrong})

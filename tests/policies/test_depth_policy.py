@@ -10,12 +10,13 @@ from torch import Tensor, nn
 
 from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.config.errors import InputError
+from vinl.gait.observation import SENSED_TABLE
 from vinl.policies.card import PolicyCard, locomotion_card, navigation_card
-from vinl.policies.depth_actor import DepthActor
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy, save_policy
-from vinl.policies.networks import MapActor, PolicyNetwork
+from vinl.policies.networks import PolicyNetwork, StepActor
 from vinl.policies.policy import LocomotionPolicy
+from vinl.policies.stepping_actor import SteppingActor
 from vinl.robot.cameras import LOCOMOTION_CAMERA
 
 CAMERA = replace(LOCOMOTION_CAMERA, width=6, height=4)
@@ -46,7 +47,7 @@ class CountingEye(PolicyNetwork):
 
 @pytest.fixture
 def card() -> PolicyCard:
-    return locomotion_card("eye", CountingEye().describe(), scan=False, camera=CAMERA.describe())
+    return locomotion_card("eye", CountingEye().describe(), camera=CAMERA.describe())
 
 
 def observe(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -108,11 +109,11 @@ def test_it_comes_back_from_its_folder(card: PolicyCard, tmp_path: Path) -> None
 
 def test_a_student_acts_alike_when_it_comes_back(tmp_path: Path) -> None:
     torch.manual_seed(0)
-    student = DepthActor(height=18, width=32, visual=8, hidden=8, layers=1, actor=(16,))
-    camera = replace(LOCOMOTION_CAMERA, width=32, height=18)
-    card = locomotion_card("student", student.describe(), scan=False, camera=camera.describe())
+    camera = replace(LOCOMOTION_CAMERA, width=32, height=18, missing="plane").describe()
+    student = SteppingActor(camera, hidden=8, layers=1, actor=(16,))
+    card = locomotion_card("student", student.describe(), table=SENSED_TABLE, camera=camera)
     back = load_policy(save_policy(tmp_path / "student", student, card))
-    seen = np.linspace(-1, 1, 96).reshape(2, 48), np.full((2, 18, 32), 0.5, np.float32)
+    seen = np.linspace(-1, 1, 90).reshape(2, 45), np.full((2, 18, 32), 0.5, np.float32)
     np.testing.assert_array_equal(back.act(*seen), DepthPolicy(student, card).act(*seen))
 
 
@@ -135,6 +136,6 @@ def test_cards_that_do_not_fit(card: PolicyCard, tmp_path: Path) -> None:
 
 
 def test_a_locomotor_is_no_navigator() -> None:
-    network = MapActor(encoder=(8,), code=4, actor=(8,))
+    network = StepActor(actor=(8,))
     with pytest.raises(InputError, match="legs is a locomotion policy; a navigator"):
-        LearnedNavigator(LocomotionPolicy(network, locomotion_card("legs", network.describe())))
+        LearnedNavigator(LocomotionPolicy(network, locomotion_card("legs", network.describe(), gait={})))

@@ -11,18 +11,20 @@ import torch
 from vinl.config.errors import InputError
 from vinl.policies.card import locomotion_card
 from vinl.policies.io import WEIGHTS_FILE, find_policy, list_policies, load_policy, save_policy
-from vinl.policies.networks import MapActor
+from vinl.policies.networks import StepActor
 
 
-def small_actor() -> MapActor:
+def small_actor() -> StepActor:
     torch.manual_seed(0)
-    return MapActor(encoder=(8,), code=4, actor=(16,))
+    return StepActor(actor=(16,))
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     network = small_actor()
-    return save_policy(tmp_path / "mine", network, locomotion_card("mine", network.describe(), seed=3, samples=10))
+    return save_policy(
+        tmp_path / "mine", network, locomotion_card("mine", network.describe(), gait={}, seed=3, samples=10)
+    )
 
 
 def edit_card(folder: Path, **changes: object) -> None:
@@ -32,7 +34,7 @@ def edit_card(folder: Path, **changes: object) -> None:
 
 def test_policy_comes_back(folder: Path):
     policy = load_policy(folder)
-    observation = torch.randn(5, 235)
+    observation = torch.randn(5, 111)
     torch.testing.assert_close(policy.act(observation), small_actor()(observation), rtol=0, atol=0)
     assert (policy.card.name, policy.card.seed, policy.card.samples) == ("mine", 3, 10)
     assert policy.card.action["scale"] == 0.25
@@ -40,9 +42,9 @@ def test_policy_comes_back(folder: Path):
 
 def test_half_precision_weights_are_smaller_and_act_alike(folder: Path):
     network = small_actor()
-    half = save_policy(folder.parent / "half", network, locomotion_card("half", network.describe()), half=True)
+    half = save_policy(folder.parent / "half", network, locomotion_card("half", network.describe(), gait={}), half=True)
     assert (half / WEIGHTS_FILE).stat().st_size < 0.7 * (folder / WEIGHTS_FILE).stat().st_size
-    observation = np.linspace(-1, 1, 470, dtype=np.float32).reshape(2, 235)
+    observation = np.linspace(-1, 1, 222, dtype=np.float32).reshape(2, 111)
     np.testing.assert_allclose(load_policy(half).act(observation), load_policy(folder).act(observation), atol=2e-3)
 
 
@@ -56,7 +58,7 @@ def test_loading_leaves_the_random_numbers_alone(folder: Path):
 
 def test_saving_again_replaces_and_leaves_nothing_behind(folder: Path):
     network = small_actor()
-    save_policy(folder, network, locomotion_card("second", network.describe()))
+    save_policy(folder, network, locomotion_card("second", network.describe(), gait={}))
     assert load_policy(folder).card.name == "second"
     assert [p.name for p in folder.parent.iterdir()] == ["mine"]
 
@@ -68,7 +70,7 @@ def test_saving_fails_whole(folder: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("vinl.policies.io.save_file", fail)
     network = small_actor()
     with pytest.raises(OSError, match="disk full"):
-        save_policy(folder, network, locomotion_card("second", network.describe()))
+        save_policy(folder, network, locomotion_card("second", network.describe(), gait={}))
     assert load_policy(folder).card.name == "mine"
     assert [p.name for p in folder.parent.iterdir()] == ["mine"]
 
@@ -78,7 +80,7 @@ def test_saving_refuses_a_folder_of_other_things(tmp_path: Path):
     (tmp_path / "thesis" / "chapter.tex").touch()
     network = small_actor()
     with pytest.raises(InputError, match=r"holds chapter\.tex"):
-        save_policy(tmp_path / "thesis", network, locomotion_card("x", network.describe()))
+        save_policy(tmp_path / "thesis", network, locomotion_card("x", network.describe(), gait={}))
 
 
 def test_run_folder_leads_to_its_policy(folder: Path):
@@ -107,18 +109,20 @@ def test_bad_policies(folder: Path, tmp_path: Path):
     card = json.loads((folder / "card.json").read_text())
     weights = (folder / WEIGHTS_FILE).read_bytes()
 
-    edit_card(folder, network=card["network"] | {"code": 7})
-    refused(r"actor\.0\.weight is \(16, 55\) by card\.json and \(16, 52\) in policy\.safetensors")
-    edit_card(folder, network=card["network"] | {"class": "MapActr"})
-    refused("unknown network class 'MapActr', did you mean 'MapActor'")
+    edit_card(folder, network=card["network"] | {"actor": [18]})
+    refused(r"actor\.0\.\w+ is \(18(, 111)?,?\) by card\.json and \(16(, 111)?,?\) in policy\.safetensors")
+    edit_card(folder, network=card["network"] | {"class": "StepActr"})
+    refused("unknown network class 'StepActr', did you mean 'StepActor'")
+    edit_card(folder, network=card["network"] | {"class": "MapActor"})  # of versions that had a height scan
+    refused("unknown network class 'MapActor'")
     edit_card(folder, network=card["network"] | {"layers": 3})
-    refused("MapActor cannot be built")
+    refused("StepActor cannot be built")
     edit_card(folder, network=card["network"] | {"actor": [10**12, 10**12]})
     refused(r"does not fit the weights: actor\.\d\.\w+ is \(1000000000000|cannot be built")
     edit_card(folder, network=card["network"] | {"actor": [0]})
     refused("must be a positive whole number, got 0")
     edit_card(folder, network=card["network"], observation=card["observation"][:-1])
-    refused("network takes 235 numbers|observation has 7 rows")
+    refused("network takes 111 numbers, the observation table has 109")
     edit_card(folder, observation=[card["observation"][0] | {"scale": [1.0]}, *card["observation"][1:]])
     refused("'base_linear_velocity'.* is not what this version fills")
     edit_card(folder, observation=card["observation"], kind="navigation")
@@ -160,7 +164,7 @@ def test_weights_that_are_not_finite_are_refused(folder: Path):
     with torch.no_grad():
         network.actor[0].bias[0] = float("inf")  # type: ignore[index]
     with pytest.raises(InputError, match="not finite"):
-        save_policy(folder.parent / "bad", network, locomotion_card("bad", network.describe()))
+        save_policy(folder.parent / "bad", network, locomotion_card("bad", network.describe(), gait={}))
     assert not (folder.parent / "bad").exists()
 
 

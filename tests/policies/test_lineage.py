@@ -9,12 +9,14 @@ from vinl.policies.card import PolicyCard, locomotion_card
 from vinl.policies.identity import digest_weights
 from vinl.policies.io import load_policy, save_policy
 from vinl.policies.lineage import find_commit, trace_lineage
-from vinl.policies.networks import MapActor
+from vinl.policies.networks import StepActor
 
 
-def make(name: str, samples: int, **training: object) -> tuple[MapActor, PolicyCard]:
-    network = MapActor()
-    card = locomotion_card(name, network.describe(), samples=samples, commit=f"of {name}", training=dict(training))
+def make(name: str, samples: int, **training: object) -> tuple[StepActor, PolicyCard]:
+    network = StepActor(actor=(16,))
+    card = locomotion_card(
+        name, network.describe(), gait={}, samples=samples, commit=f"of {name}", training=dict(training)
+    )
     return network, card
 
 
@@ -51,8 +53,8 @@ def test_a_policy_that_is_written_again_has_the_digest_of_what_is_loaded(tmp_pat
 
 
 def test_weights_that_no_training_made_have_no_lineage(tmp_path: Path) -> None:
-    network = MapActor()
-    save_policy(tmp_path / "mine", network, locomotion_card("mine", network.describe()))
+    network = StepActor(actor=(16,))
+    save_policy(tmp_path / "mine", network, locomotion_card("mine", network.describe(), gait={}))
     assert load_policy(tmp_path / "mine").card.training == {}
 
 

@@ -1,28 +1,28 @@
-"""The policy object: numpy and torch alike, batched, the paper's network."""
+"""The policy object: numpy and torch alike, batched, the paper's sizes."""
 
 import numpy as np
 import pytest
 import torch
 
 from vinl.policies.card import locomotion_card
-from vinl.policies.networks import MapActor, build_network
+from vinl.policies.networks import StepActor, build_network
 from vinl.policies.policy import LocomotionPolicy
 
 
 @pytest.fixture
 def policy() -> LocomotionPolicy:
-    network = MapActor()
-    return LocomotionPolicy(network, locomotion_card("x", network.describe()))
+    network = StepActor()
+    return LocomotionPolicy(network, locomotion_card("x", network.describe(), gait={}))
 
 
 def test_paper_sizes(policy: LocomotionPolicy):
     shapes = {name: tuple(p.shape) for name, p in policy.network.named_parameters() if p.ndim == 2}
-    assert list(shapes.values()) == [(128, 187), (64, 128), (32, 64), (512, 80), (256, 512), (128, 256), (12, 128)]
-    assert {name.split(".")[0] for name in shapes} == {"encoder", "actor"}
+    assert list(shapes.values()) == [(512, 111), (256, 512), (128, 256), (12, 128)]
+    assert {name.split(".")[0] for name in shapes} == {"actor"}
 
 
 def test_numpy_and_torch_agree(policy: LocomotionPolicy):
-    observation = np.random.default_rng(0).normal(size=(6, 235))
+    observation = np.random.default_rng(0).normal(size=(6, 111))
     action = policy.act(observation)
     assert action.dtype == np.float32 and action.shape == (6, 12)
     np.testing.assert_allclose(action, policy.act(torch.from_numpy(observation)).numpy(), rtol=1e-6)
@@ -33,23 +33,23 @@ def test_numpy_and_torch_agree(policy: LocomotionPolicy):
 
 
 def test_action_can_be_written_to_and_carries_no_gradient(policy: LocomotionPolicy):
-    action = policy.act(torch.zeros(2, 235, requires_grad=True))
+    action = policy.act(torch.zeros(2, 111, requires_grad=True))
     action += 1
     assert not action.requires_grad
 
 
 def test_no_robot_is_no_problem(policy: LocomotionPolicy):
-    assert policy.act(np.zeros((0, 235))).shape == (0, 12)
+    assert policy.act(np.zeros((0, 111))).shape == (0, 12)
 
 
-@pytest.mark.parametrize("shape", [(3, 48), (3, 236)])
+@pytest.mark.parametrize("shape", [(3, 48), (3, 112)])
 def test_wrong_size_is_named(policy: LocomotionPolicy, shape: tuple[int, int]):
-    with pytest.raises(ValueError, match=r"x observes \(n, 235\), got \(3, "):
+    with pytest.raises(ValueError, match=r"x observes \(n, 111\), got \(3, "):
         policy.act(np.zeros(shape))
 
 
 def test_description_rebuilds_the_network():
-    network = MapActor(encoder=(8,), code=4, actor=(16, 8))
+    network = StepActor(actor=(16, 8))
     again = build_network(network.describe())
     assert {k: v.shape for k, v in again.state_dict().items()} == {k: v.shape for k, v in network.state_dict().items()}
 

@@ -3,10 +3,7 @@ import pytest
 
 from vinl.robot.aliengo import DEFAULT_POSE, home_qpos
 from vinl.robot.observation import (
-    NOISE,
-    OBSERVATION_SIZE,
     PROPRIOCEPTION_SIZE,
-    SCALE,
     SCAN_POINTS,
     SCAN_SIZE,
     TABLE,
@@ -33,17 +30,17 @@ def test_layout():
         ("previous_action", 12),
         ("height_scan", 187),
     ]
-    assert (PROPRIOCEPTION_SIZE, SCAN_SIZE, OBSERVATION_SIZE) == (48, 187, 235)
-    assert SCALE.shape == NOISE.shape == (235,)
+    assert (PROPRIOCEPTION_SIZE, SCAN_SIZE, TABLE.size) == (48, 187, 235)
+    assert TABLE.scale.shape == TABLE.noise.shape == (235,)
 
 
 def test_scales_are_those_of_the_published_config():
     expected = (
         [2.0] * 3 + [0.25] * 3 + [1.0] * 3 + [2.0, 2.0, 0.25] + [1.0] * 12 + [0.05] * 12 + [1.0] * 12 + [5.0] * 187
     )
-    assert np.allclose(SCALE, expected)
+    assert np.allclose(TABLE.scale, expected)
     noise = [0.2] * 3 + [0.05] * 3 + [0.05] * 3 + [0] * 3 + [0.01] * 12 + [0.075] * 12 + [0] * 12 + [0.5] * 187
-    assert np.allclose(NOISE, noise)
+    assert np.allclose(TABLE.noise, noise)
 
 
 def test_scan_points():

@@ -219,9 +219,7 @@ def with_gait() -> Policy:
     """Observes the rows of a gait; random weights, it stands nearly still."""
     torch.manual_seed(0)
     network: PolicyNetwork = StepActor(actor=[16])
-    return LocomotionPolicy(
-        network, locomotion_card("steps", network.describe(), scan=False, gait=asdict(GaitConfig()))
-    )
+    return LocomotionPolicy(network, locomotion_card("steps", network.describe(), gait=asdict(GaitConfig())))
 
 
 def test_planned_footholds_are_those_of_the_gait_and_outlast_a_block():

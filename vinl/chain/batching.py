@@ -209,7 +209,7 @@ def _answer(network: PolicyNetwork, inputs: Sequence[Tensor], size: int, shift: 
                 calls.append([network(vector[rows])])
                 continue
             image, *state = seen
-            before, fresh = tuple(part[:, rows] for part in state), torch.zeros(1, size, dtype=torch.bool)
+            before, fresh = tuple(part[:, rows] for part in state), (rows % 2 == 0)[None]  # some begin an episode
             # called as ``BatchedPolicy`` does, layout in memory included: it decides too how libraries add up
             answer, after = cast(Any, network)(image[rows][None], vector[rows][None], before, fresh)
             calls.append([answer[0], *(part.transpose(0, 1) for part in after)])

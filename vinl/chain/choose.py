@@ -94,12 +94,11 @@ def check_locomotion_policy(policy: Policy) -> None:
     card = policy.card
     if card.kind != "locomotion":
         raise InputError(f"{card.name} is a {card.kind} policy; a locomotor (--loco, --policy) is a locomotion policy")
-    gait = find_gait(card) is not None
-    plain, scanned = (locomotion_table(scan, gait).size for scan in (False, True))
-    if card.observation_size not in (SENSED_TABLE.size, plain, scanned):
+    wanted = locomotion_table(find_gait(card) is not None).size
+    if card.observation_size not in (SENSED_TABLE.size, wanted):
         raise InputError(
-            f"policy {card.name} observes {card.observation_size} numbers; the robot has {plain}, or {scanned} "
-            "with the height scan"
+            f"policy {card.name} observes {card.observation_size} numbers; the robot has {wanted}, or "
+            f"{SENSED_TABLE.size} without the velocity of its trunk"
         )
 
 

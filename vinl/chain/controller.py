@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from vinl.chain.depth_cameras import CameraErrors, DepthCameras, RealCameras, open_depth_cameras
-from vinl.chain.ground_reader import GaitReader, ScanReader, map_plan
+from vinl.chain.ground_reader import GaitReader, map_plan
 from vinl.config.errors import InputError
 from vinl.gait.observation import SENSED_TABLE, insert_gait
-from vinl.policies.card import PolicyCard, find_gait, reads_ground
+from vinl.policies.card import PolicyCard, find_gait
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import DEFAULT_POSE
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, observe
@@ -25,13 +25,11 @@ ACTION_LIMIT = 100.0
 class LocomotionController:
     """One control step of a locomotion policy for n robots: observe, act, joint targets. Remembers the last actions.
 
-    A policy gets what its card lists: proprioception, with or without the velocity of the trunk, the rows of a gait
-    that is planned on the map, the height scan; one with a camera gets depth.
+    A policy gets what its card lists: proprioception, with or without the velocity of the trunk, and the rows of a gait
+    that is planned on the map; one with a camera gets depth.
 
     Args:
         policy: the locomotion policy.
-        scan: reads the height scan that the policy observes, and bends its commands if it was trained so; None: it
-            observes none.
         cameras: renders depth; needed only by a policy with a camera.
         gait: plans the gait whose rows the policy observes; None: it observes none.
 
@@ -43,11 +41,10 @@ class LocomotionController:
     def __init__(
         self,
         policy: Policy,
-        scan: ScanReader | None,
         cameras: DepthCameras | RealCameras | None,
         gait: GaitReader | None = None,
     ) -> None:
-        self.policy, self._scan, self._cameras, self._gait = policy, scan, cameras, gait
+        self.policy, self._cameras, self._gait = policy, cameras, gait
         sensed = policy.card.observation_size == SENSED_TABLE.size
         self._first = PROPRIOCEPTION_SIZE - SENSED_TABLE.size if sensed else 0
         self.actions = np.zeros((0, 12), np.float32)
@@ -91,10 +88,7 @@ class LocomotionController:
         Raises:
             InputError: the policy's answer is none.
         """
-        ground = None
-        if self._scan is not None:
-            ground = self._scan.read(qpos)
-        observation = observe(np, qpos, qvel, command, self.actions, ground)[:, self._first :]
+        observation = observe(np, qpos, qvel, command, self.actions)[:, self._first :]
         if self._gait is not None:
             observation = insert_gait(np, observation, self._gait.read(qpos, qvel, command))
         if self._cameras is None:
@@ -114,12 +108,11 @@ def open_controller(
 ) -> LocomotionController:
     """The controller of robots in a floor plan, each with its own clutter, see ``open_depth_cameras``; ``errors`` are
     those of their cameras."""
-    scan = ScanReader.on_plan(plan, blocks) if reads_ground(locomotor.card) else None
     cameras = None if locomotor.camera is None else open_depth_cameras(plan, blocks, locomotor.camera, ceiling)
     config = find_gait(locomotor.card)
     gait = None if config is None else GaitReader(config, map_plan(plan, blocks))
     return LocomotionController(
-        locomotor, scan, cameras if cameras is None or errors is None else errors.put_on(cameras), gait
+        locomotor, cameras if cameras is None or errors is None else errors.put_on(cameras), gait
     )
 
 

@@ -1,5 +1,5 @@
-"""The ground under each robot of a unit: every episode has its own grid, all are read in one look-up, for the height
-scan and for the gait of policies that know the ground."""
+"""The ground under each robot of a unit: every episode has its own grid, all are read in one look-up, for the gait of
+policies that know the ground and for the height scan of environments."""
 
 from __future__ import annotations
 
@@ -63,26 +63,22 @@ class Stack:
 
 
 class ScanReader:
-    """Reads the height scan of all robots of a unit.
+    """Reads the height scan of robots in a floor plan. Walls and furniture stand as heights on the plan's grid; what
+    hangs above the robot leaves the floor free.
+
+    Level ground lies around them, as wide as robots look from where they are: none reads a neighbour's grid.
 
     Args:
-        fields: one for each robot, or one for all.
+        plan: where they are.
+        blocks: of each robot.
     """
 
-    def __init__(self, fields: Sequence[HeightField]) -> None:
+    def __init__(self, plan: FloorPlan, blocks: Sequence[Blocks]) -> None:
+        bare = flat_field(plan.frame.widen(int(np.ceil(SCAN_RADIUS / plan.frame.resolution)) + 1))
+        raise_boxes(bare, plan.boxes.below(BODY_HEIGHT), WALL)
+        fields = raise_blocks(bare, blocks)
         self._heights = np.concatenate([field.heights for field in fields]).ravel()
-        self._stack = Stack(fields[0].frame, len(fields))
-
-    @classmethod
-    def on_plan(cls, plan: FloorPlan, blocks: Sequence[Blocks]) -> ScanReader:
-        """Of robots in a floor plan, each with its own blocks. Walls and furniture stand as heights on the plan's grid;
-        what hangs above the robot leaves the floor free.
-
-        Level ground lies around them, as wide as robots look from where they are: none reads a neighbour's grid.
-        """
-        field = flat_field(plan.frame.widen(int(np.ceil(SCAN_RADIUS / plan.frame.resolution)) + 1))
-        raise_boxes(field, plan.boxes.below(BODY_HEIGHT), WALL)
-        return cls(raise_blocks(field, blocks))
+        self._stack = Stack(bare.frame, len(fields))
 
     def read(self, qpos: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n points"]:
         """Height of the ground [m] under the scan points of every robot."""

@@ -202,13 +202,13 @@ def check_policy() -> str:
     """Every shipped policy loads and acts; without one, a fresh network does."""
     from vinl.policies.card import locomotion_card
     from vinl.policies.io import list_policies, load_policy
-    from vinl.policies.networks import MapActor
+    from vinl.policies.networks import StepActor
     from vinl.policies.policy import LocomotionPolicy
 
     names = list_policies()
-    network = MapActor()
+    network = StepActor()
     policies = [load_policy(name) for name in names] or [
-        LocomotionPolicy(network, locomotion_card("untrained", network.describe()))
+        LocomotionPolicy(network, locomotion_card("untrained", network.describe(), gait={}))
     ]
     for policy in policies:
         zeros, camera = np.zeros((2, policy.card.observation_size), np.float32), policy.camera

@@ -57,8 +57,7 @@ def describe_senses(card: PolicyCard) -> str:
         seen = card.camera
         degrees = math.degrees(seen["hfov"])
         return f"depth {seen['width']} x {seen['height']}, {degrees:.0f} deg, to {seen['far']:g} m"
-    reads = card.kind == "locomotion" and not str(card.network.get("class", "")).startswith("Blind")
-    return "height scan" if reads and any(row["name"] == "height_scan" for row in card.observation) else "nothing"
+    return "the true ground" if card.gait is not None and card.gait.get("map", True) else "nothing"
 
 
 def headline(card: PolicyCard) -> str:

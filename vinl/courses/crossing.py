@@ -77,7 +77,7 @@ class BarConfig:
 
 
 def build_corridor(config: BarConfig) -> Ground:
-    """Walls, bar and what height scan and camera see of them, with the middle of the bar at the origin."""
+    """Walls, bar and what gait and camera see of them, with the middle of the bar at the origin."""
     begin, end = -config.depth / 2 - APPROACH - SPREAD - _MARGIN, config.end + _MARGIN
     aside = (WIDTH + _WALL_THICKNESS) / 2
     walls = Boxes(

@@ -83,7 +83,7 @@ class Ground:
 
     Attributes:
         model: the world.
-        field: what the height scan reads.
+        field: what maps and cameras see.
         homes: (h, 3) where robots start: x, y and ground height [m].
         levels: (h,) level of each home; -1 where there are none.
         kinds: terrain type of each home.

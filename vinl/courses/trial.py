@@ -12,14 +12,14 @@ from jaxtyping import Bool, Float
 
 from vinl.chain.controller import LocomotionController
 from vinl.chain.depth_cameras import DepthCameras
-from vinl.chain.ground_reader import GaitReader, ScanReader, map_ground
+from vinl.chain.ground_reader import GaitReader, map_ground
 from vinl.chain.metrics import tracking_errors
 from vinl.chain.robot import Robot, Robots
 from vinl.courses.block_contacts import BlockContacts, Strain, StrainReader
 from vinl.courses.courses import Course, Start
 from vinl.courses.grounds import Ground
 from vinl.courses.robot_records import RobotRecord, StepCounter, record_gait
-from vinl.policies.card import find_gait, reads_ground
+from vinl.policies.card import find_gait
 from vinl.policies.policy import Policy
 from vinl.world.endings import MAX_TILT
 from vinl.world.grid import WALL
@@ -105,7 +105,7 @@ def run_trial(
 
     Args:
         herd: one robot for each course.
-        ground: what height scan and camera see, and how far robots may go.
+        ground: what gait and camera see, and how far robots may go.
         courses: starts and commands.
         policy: what drives them.
         is_stopped: asked once a second whether to give up.
@@ -159,14 +159,13 @@ def run_trial(
 
 def controller_on_course(policy: Policy, ground: Ground, n: int) -> LocomotionController:
     """What a policy of n robots observes on a ground that all of them walk on."""
-    scan = ScanReader([ground.field]) if reads_ground(policy.card) else None
     cameras = None if policy.camera is None else DepthCameras([ground.mesh()], [0] * n, policy.camera)
     config = find_gait(policy.card)
     gait = None
     if config is not None:
         bare = np.where(ground.field.labels == WALL, 0.0, ground.field.heights).astype(np.float32)
         gait = GaitReader(config, map_ground(bare, ground.field.frame, ground.blocks.boxes() + ground.walls))
-    return LocomotionController(policy, scan, cameras, gait)
+    return LocomotionController(policy, cameras, gait)
 
 
 def _add_touches(

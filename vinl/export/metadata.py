@@ -19,7 +19,7 @@ from vinl.policies.identity import digest_weights
 from vinl.policies.policy import LocomotionPolicy
 from vinl.robot.aliengo import CONTROL_DT, JOINTS
 from vinl.robot.cameras import Camera
-from vinl.robot.observation import CLIP, SCAN_OFFSET, SCAN_POINTS
+from vinl.robot.observation import CLIP
 
 TRUNK = "trunk frame: origin in the middle of the trunk, x forward, y left, z up, fixed to the trunk"
 HEADING = "heading frame: origin below the middle of the trunk, x along its heading, y left, z up, level"
@@ -44,8 +44,6 @@ MEANINGS = {
     "rate": "how fast the clock of each leg runs while it stands, less 1",
     "hip": "how far the hips should rise above their usual height",
     "missed": f"how far the trunk has fallen behind its commands, forward and left; {HEADING}",
-    "height_scan": f"height of the trunk's origin - {SCAN_OFFSET} m - height of the ground at points_m, held to +-1 m; "
-    f"{HEADING}",
     "goal_distance": "straight horizontal distance from the trunk's origin to the goal, from odometry",
     "goal_direction": f"cosine and sine of the goal's bearing, left positive; {HEADING}",
     "previous_motion": "what the robot did since the last decision, as the action that asks for it: mean forward speed "
@@ -56,7 +54,7 @@ MEANINGS = {
 
 
 def explain_rows(table: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The rows of a card's table with ``meaning``, frame included, and the points of a height scan.
+    """The rows of a card's table with ``meaning``, frame included.
 
     A row that brings its own ``meaning`` keeps it.
 
@@ -69,8 +67,7 @@ def explain_rows(table: list[dict[str, Any]]) -> list[dict[str, Any]]:
         if "meaning" not in row and name not in MEANINGS:
             near = closest(name, list(MEANINGS))
             raise InputError(f"export does not know what the observation {name!r} means{near}; give its row a meaning")
-        more = {"points_m": SCAN_POINTS.tolist()} if name == "height_scan" else {}
-        explained.append({"meaning": MEANINGS.get(name), **row, **more})
+        explained.append({"meaning": MEANINGS.get(name), **row})
     return explained
 
 

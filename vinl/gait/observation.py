@@ -23,7 +23,7 @@ STEPPING_TABLE = ObservationTable((*PROPRIOCEPTION.terms, *GAIT_ROWS))
 """What an actor observes whose footholds come from a map: 48 numbers of the robot's own and 63 of its gait."""
 
 STEPPING_MAP_TABLE = ObservationTable((*STEPPING_TABLE.terms, HEIGHT_SCAN))
-"""The same, and the height scan: for an actor with a learned code beside the footholds, and for every critic."""
+"""The same, and the height scan: what critics observe."""
 
 SENSED_TABLE = ObservationTable(PROPRIOCEPTION.terms[1:])
 """What a robot measures of itself: proprioception without the velocity of its trunk, 45 numbers."""

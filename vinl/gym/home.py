@@ -70,8 +70,8 @@ class HomeEnv(gymnasium.Env):
     and ``depth`` of the navigation camera: what ``vinl/Nav-v0`` has.
 
     ``control="joints"``: an action (12,) in [-1, 1] x ``joint_reach`` rad is where the joints shall be relative to the
-    default pose, for 0.02 s. Observed are ``goal`` (3,), as above, ``proprioception`` (48,), the locomotor's table
-    without the height scan, and ``depth`` of the locomotion camera. With a ``navigator`` the command in the table is
+    default pose, for 0.02 s. Observed are ``goal`` (3,), as above, ``proprioception`` (48,), what a robot
+    knows of itself, and ``depth`` of the locomotion camera. With a ``navigator`` the command in the table is
     what that chooses, without one it is zero.
 
     The reward is the navigator's [facts/navigation 1.1, column A]: metres that the goal came nearer on foot, a bonus at

@@ -91,7 +91,7 @@ class AgentObservation:
         self._depth = {
             image: open_depth_cameras(plan, blocks, camera, ceiling) for image, camera in self._cameras.items()
         }
-        self._scan = ScanReader.on_plan(plan, blocks) if self._with_scan else None
+        self._scan = ScanReader(plan, blocks) if self._with_scan else None
 
     def observe(
         self, trip: Trip, command: Float[np.ndarray, "1 3"], previous: Float[np.ndarray, "1 a"]

@@ -137,4 +137,4 @@ def train_student(
 
 def _teacher_card(name: str, config: LocoConfig, network: dict[str, Any], samples: int, commit: str) -> PolicyCard:
     action = {**describe_action(), "kp": config.kp, "kd": config.kd}
-    return locomotion_card(name, network, action, False, asdict(config.gait), samples=samples, commit=commit)
+    return locomotion_card(name, network, action, asdict(config.gait), samples=samples, commit=commit)

@@ -173,4 +173,4 @@ def make_card(
     action = {**describe_action(), "kp": config.kp, "kd": config.kd}
     training = {**dump_config(config), **({"origin": origin} if origin else {})}
     learned = {"seed": config.seed, "samples": samples, "commit": commit}
-    return locomotion_card(name, network, action, False, asdict(config.gait), training=training, **learned)
+    return locomotion_card(name, network, action, asdict(config.gait), training=training, **learned)

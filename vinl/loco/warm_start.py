@@ -72,13 +72,12 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
     network = policy.network
     # the gait is looked at by itself: one without a map has the same weights
     given, wanted = (_without_gait(x) for x in (network, StepActor(actor=config.ppo.actor)))
-    if policy.card.kind == "locomotion":
-        _check_gait(name_or_path, policy.card, config)
     if given != wanted:
         raise InputError(
             f"--from {name_or_path}: its network {_list(given)} is not that of this training "
             f"{_list(wanted)}; set ppo.actor to its own, or give another policy"
         )
+    _check_gait(name_or_path, policy.card, config)
     check_gains(name_or_path, policy.card, config)
     actor = {name: weight.clone() for name, weight in network.state_dict().items()}
     critic = _load_critic(name_or_path, config)
@@ -93,42 +92,35 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[StepActor, Orig
         config: of the student's training.
 
     Raises:
-        InputError: no such policy, one that is no ``StepActor``, one with another gait or none, or one with other
-            joint gains.
+        InputError: no such policy, one that is no ``StepActor``, one with another gait, or one with other joint
+            gains.
     """
     policy = load_policy(name_or_path)
-    if policy.card.kind == "locomotion":
-        _check_gait(name_or_path, policy.card, config)
     if not isinstance(policy.network, StepActor):
         kind = _KINDS.get(type(policy.network).__name__, type(policy.network).__name__)
         raise InputError(
             f"--from {name_or_path}: a student learns from a locomotor that knows where its feet shall go (StepActor, "
             f"such as vinl/teacher); this is {kind}"
         )
+    _check_gait(name_or_path, policy.card, config)
     check_gains(name_or_path, policy.card, config)
     return policy.network, find_origin(policy.card, policy.network, critic=False)
 
 
 _KINDS = {
-    "MapActor": "one that needs a height scan, too (MapActor)",
     "SteppingActor": "a student itself (SteppingActor)",
     "NavActor": "a navigator (NavActor)",
 }
 
 
 def _check_gait(name_or_path: str, card: PolicyCard, config: LocoConfig) -> None:
-    """Refuse a policy that knows no gait, as those from before there was one (their commands may be bent, too), or
-    that walks with another.
+    """Refuse a ``StepActor`` that walks with another gait.
 
     Raises:
         InputError: it does.
     """
     gait = find_gait(card)
-    if gait is None:
-        raise InputError(
-            f"--from {name_or_path}: it was trained without the gait, which every training has now; train a new one: "
-            "vinl train-loco --stage 1, then --stage 2 --from its run"
-        )
+    assert gait is not None  # what a StepActor observes is refused on a card without one
     # with a map or without one, what a policy observes of its gait means the same
     other = [name for name, value in asdict(gait).items() if name != "map" and value != getattr(config.gait, name)]
     if other:

@@ -14,7 +14,7 @@ from vinl.config.errors import InputError
 from vinl.policies.card import PolicyCard, locomotion_card
 from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP
 from vinl.robot.cameras import Camera
-from vinl.robot.observation import OBSERVATION_SIZE, PROPRIOCEPTION_SIZE
+from vinl.robot.observation import PROPRIOCEPTION_SIZE
 
 
 class OwnNavigator:
@@ -79,7 +79,6 @@ def as_navigator(
 def as_locomotor(
     act: Callable[..., Any],
     camera: Camera | None = None,
-    scan: bool = False,
     name: str | None = None,
     scale: float = ACTION_SCALE,
     default_pose: Sequence[float] = tuple(DEFAULT_POSE),
@@ -89,11 +88,10 @@ def as_locomotor(
     """A locomotor from a function; an object with ``__call__`` and ``reset(n or mask)`` may remember.
 
     Args:
-        act: is given the observations of n robots 50 times a second: (n, 48), the table in docs/policies.md without
-            the height scan, or (n, 235) with it, float32; and with a camera depth (n, height, width) [m] as a torch
-            tensor. Returns actions (n, 12): joint targets are ``default_pose + scale * action``.
+        act: is given the observations of n robots 50 times a second: (n, 48) float32, ``PROPRIOCEPTION`` in
+            docs/robot.md; and with a camera depth (n, height, width) [m] as a torch tensor. Returns actions (n, 12):
+            joint targets are ``default_pose + scale * action``.
         camera: that it sees through; none by default.
-        scan: whether it is given the height scan.
         name: in results; the function's own by default.
         scale: [rad].
         default_pose: joint angles [rad].
@@ -101,8 +99,7 @@ def as_locomotor(
         kd: velocity gain of the joints [N m s / rad].
     """
     called = name or getattr(act, "__name__", type(act).__name__)
-    size = OBSERVATION_SIZE if scan else PROPRIOCEPTION_SIZE
-    network = {"class": "function", "observation_size": size}
+    network = {"class": "function", "observation_size": PROPRIOCEPTION_SIZE}
     action = {"scale": scale, "default_pose": [float(q) for q in default_pose], "kp": kp, "kd": kd}
     seen = None if camera is None else camera.describe()
-    return OwnLocomotor(act, camera, locomotion_card(called, network, action, scan, camera=seen))
+    return OwnLocomotor(act, camera, locomotion_card(called, network, action, camera=seen))

@@ -11,9 +11,9 @@ from typing import Any, Literal
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.gait.config import GaitConfig
-from vinl.gait.observation import GAIT_ROWS
+from vinl.gait.observation import STEPPING_TABLE
 from vinl.robot.aliengo import ACTION_SCALE, DEFAULT_POSE, KD, KP
-from vinl.robot.observation import HEIGHT_SCAN, PROPRIOCEPTION, ObservationTable
+from vinl.robot.observation import PROPRIOCEPTION, ObservationTable
 
 SCHEMA = 1
 """Version of ``card.json``."""
@@ -101,7 +101,6 @@ def locomotion_card(
     name: str,
     network: dict[str, Any],
     action: dict[str, Any] | None = None,
-    scan: bool = True,
     gait: dict[str, Any] | None = None,
     table: ObservationTable | None = None,
     **rest: Any,
@@ -112,18 +111,16 @@ def locomotion_card(
         name: short name.
         network: as ``PolicyNetwork.describe`` gives it.
         action: scale, default pose and gains.
-        scan: whether it observes the height scan; a policy that sees through a camera does not.
         gait: settings of the gait whose rows it observes; None: it observes none.
-        table: what it observes, where that is another than ``scan`` and ``gait`` say.
+        table: what it observes, where that is another than ``gait`` says.
     """
-    rows = (table or locomotion_table(scan, gait is not None)).describe()
+    rows = (table or locomotion_table(gait is not None)).describe()
     return PolicyCard("locomotion", name, network, rows, action or describe_action(), gait=gait, **rest)
 
 
-def locomotion_table(scan: bool, gait: bool) -> ObservationTable:
-    """What a locomotor observes: proprioception, then the rows of its gait, then the height scan."""
-    rows = [*PROPRIOCEPTION, *(GAIT_ROWS if gait else ()), *((HEIGHT_SCAN,) if scan else ())]
-    return ObservationTable(tuple(rows))
+def locomotion_table(gait: bool) -> ObservationTable:
+    """What a locomotor observes: proprioception, then the rows of its gait if it has one."""
+    return STEPPING_TABLE if gait else PROPRIOCEPTION
 
 
 def find_gait(card: PolicyCard) -> GaitConfig | None:
@@ -133,11 +130,6 @@ def find_gait(card: PolicyCard) -> GaitConfig | None:
         InputError: the card asks for a gait that there cannot be.
     """
     return None if card.gait is None else build_config(GaitConfig, card.gait, source=f"{card.name}: gait")
-
-
-def reads_ground(card: PolicyCard) -> bool:
-    """Whether a policy observes the height scan."""
-    return any(row["name"] == HEIGHT_SCAN.name for row in card.observation)
 
 
 PREVIOUS = ("action", "motion", "both")

@@ -144,9 +144,9 @@ def _check_against_robot(card: PolicyCard, folder: Path, network: PolicyNetwork,
         wanted, actions = navigation_table(find_previous(card)), 2
     else:
         find_gait(card)
-        tables = [*(locomotion_table(scan, card.gait is not None) for scan in (True, False)), SENSED_TABLE]
-        fitting = [table for table in tables if table.size == network.observation_size]
-        wanted, actions = (fitting or tables)[0].describe(), 12
+        sensed = network.observation_size == SENSED_TABLE.size
+        table = SENSED_TABLE if sensed else locomotion_table(card.gait is not None)
+        wanted, actions = table.describe(), 12
     if network.action_size != actions or (card.kind == "navigation" and not sees):
         name, given = card.network["class"], network.action_size
         raise InputError(

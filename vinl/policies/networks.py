@@ -8,7 +8,6 @@ from inspect import signature
 from itertools import pairwise
 from typing import Any
 
-import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
@@ -17,13 +16,11 @@ from vinl.config.loader import build_config, closest
 from vinl.gait.config import GaitConfig
 from vinl.gait.observation import STEPPING_TABLE
 from vinl.policies.symmetry import SymmetricMLP
-from vinl.robot.observation import PROPRIOCEPTION_SIZE, SCAN_SIZE
 
 NETWORKS: dict[str, type[PolicyNetwork]] = {}
 """Class name to class: what a policy card may name."""
 
 ELSEWHERE = {
-    "DepthActor": "vinl.policies.depth_actor",
     "NavActor": "vinl.policies.nav_actor",
     "SteppingActor": "vinl.policies.stepping_actor",
 }
@@ -62,58 +59,6 @@ class PolicyNetwork(nn.Module):
     def describe(self) -> dict[str, Any]:
         """What ``build_network`` needs: the class name and the constructor's arguments, as plain data."""
         return {"class": type(self).__name__, **self.arguments}
-
-
-class MapActor(PolicyNetwork):
-    """The deterministic locomotion actor: the height scan becomes a short code, proprioception + code an action.
-
-    Parameters are named ``encoder.*`` and ``actor.*``. Sizes and activations are the paper's [paper III-A; ViNL
-    code]: ReLU inside the encoder and none at its end, ELU inside the actor.
-    """
-
-    def __init__(
-        self,
-        proprioception: int = PROPRIOCEPTION_SIZE,
-        scan: int = SCAN_SIZE,
-        encoder: Sequence[int] = (128, 64),
-        code: int = 32,
-        actor: Sequence[int] = (512, 256, 128),
-        actions: int = 12,
-    ) -> None:
-        """Sizes of the parts; ``encoder`` and ``actor`` are the widths of the hidden layers."""
-        super().__init__()
-        self.keep_arguments(locals())
-        self.proprioception = proprioception
-        self.observation_size, self.action_size = proprioception + scan, actions
-        self.encoder = mlp([scan, *encoder, code], nn.ReLU)
-        self.actor = mlp([proprioception + code, *actor, actions], nn.ELU)
-
-    def forward(self, observation: Float[Tensor, "n observation"]) -> Float[Tensor, "n actions"]:
-        """Scaled observations in the order of ``robot.observation.TABLE`` to actions."""
-        code = self.encoder(observation[..., self.proprioception :])
-        return self.actor(torch.cat([observation[..., : self.proprioception], code], -1))
-
-
-class BlindActor(PolicyNetwork):
-    """A locomotion actor that observes the height scan and leaves it unused: the baseline without a map."""
-
-    def __init__(
-        self,
-        proprioception: int = PROPRIOCEPTION_SIZE,
-        scan: int = SCAN_SIZE,
-        actor: Sequence[int] = (512, 256, 128),
-        actions: int = 12,
-    ) -> None:
-        """Sizes of the parts; ``actor`` are the widths of the hidden layers, ``scan`` numbers are left out."""
-        super().__init__()
-        self.keep_arguments(locals())
-        self.proprioception = proprioception
-        self.observation_size, self.action_size = proprioception + scan, actions
-        self.actor = mlp([proprioception, *actor, actions], nn.ELU)
-
-    def forward(self, observation: Float[Tensor, "n observation"]) -> Float[Tensor, "n actions"]:
-        """Scaled observations in the order of ``robot.observation.TABLE`` to actions."""
-        return self.actor(observation[..., : self.proprioception])
 
 
 class StepActor(PolicyNetwork):

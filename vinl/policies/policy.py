@@ -39,8 +39,8 @@ class Policy(Protocol):
 
 
 class LocomotionPolicy:
-    """Observations (n, 235) to actions (n, 12) at 50 Hz, without noise, on
-    the device of its network."""
+    """Observations (n, card.observation_size) to actions (n, 12) at 50 Hz, without noise, on the device of its
+    network."""
 
     camera: Camera | None = None
     """It needs no camera."""

@@ -1,4 +1,4 @@
-"""What the locomotor observes: one table, and the function that fills it, for numpy and jax.numpy alike."""
+"""What a robot knows of itself and of the ground about it: a table, and what fills it, for numpy and for jax.numpy."""
 
 from __future__ import annotations
 
@@ -122,15 +122,15 @@ SCAN_RADIUS = float(np.linalg.norm(SCAN_REACH))
 """How far the farthest of them lies from the middle of the trunk [m]."""
 
 PROPRIOCEPTION = ObservationTable(_PROPRIOCEPTION)
-"""What a policy observes that sees through a camera, beside the image."""
+"""What a robot knows of itself: the first rows of what locomotors observe."""
 
 HEIGHT_SCAN = ObservationTerm("height_scan", len(SCAN_POINTS), (5.0,), 0.1, "m")
 
 TABLE = ObservationTable((*_PROPRIOCEPTION, HEIGHT_SCAN))
-"""What a policy observes that knows the ground; scales and training noise of legged_gym [ViNL config]."""
+"""The same and the ground, which critics and agents of environments may know; scales and training noise of legged_gym
+[ViNL config]."""
 
-PROPRIOCEPTION_SIZE, SCAN_SIZE, OBSERVATION_SIZE = PROPRIOCEPTION.size, HEIGHT_SCAN.size, TABLE.size
-SCALE, NOISE = TABLE.scale, TABLE.noise
+PROPRIOCEPTION_SIZE, SCAN_SIZE = PROPRIOCEPTION.size, HEIGHT_SCAN.size
 
 
 def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, ground: Any = None) -> Any:
@@ -167,5 +167,5 @@ def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, g
     ]
     if ground is not None:
         parts.append(xp.clip(qpos[:, 2:3] - SCAN_OFFSET - ground, -1.0, 1.0))
-    scale = PROPRIOCEPTION.scale if ground is None else SCALE
+    scale = (PROPRIOCEPTION if ground is None else TABLE).scale
     return xp.clip(xp.concatenate(parts, -1) * xp.asarray(scale, dtype=qpos.dtype), -CLIP, CLIP)

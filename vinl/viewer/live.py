@@ -287,7 +287,7 @@ class LiveChain:
         self._put_down(world.start)
 
     def _build(self, world: World) -> None:
-        """Physics, height scan and cameras of a world."""
+        """Physics, gait and cameras of a world."""
         faults, blocks, ceiling = self._config.faults, [world.blocks], self._config.ceiling
         model = build_model(world.plan.boxes, world.blocks.boxes(), self._locomotion.card, faults)
         self._walker = Robot(model, faults.delay_steps)
