@@ -111,7 +111,9 @@ def test_the_motion_seen_is_what_the_poses_say(config, homes, lowest):
     from vinl.chain.navigators.learned import measure_twist
     from vinl.nav.config import ExecutionConfig
 
-    execution = ExecutionConfig(speed_lag=0.1, yaw_lag=0.05, speed_gain=(0.8, 1.0), yaw_noise=0.2, speed_noise=0.1, side_slip=0.1)
+    execution = ExecutionConfig(
+        speed_lag=0.1, yaw_lag=0.05, speed_gain=(0.8, 1.0), yaw_noise=0.2, speed_noise=0.1, side_slip=0.1
+    )
     robot = replace(config.robot, min_speed=lowest)
     environment = NavEnvironment(replace(config, num_envs=200, camera=None, execution=execution, robot=robot), homes)
 
