@@ -98,6 +98,7 @@ def end_episodes(state: Mapping[str, Tensor], counted: Bool[Tensor, " n"], succe
 
 
 _NAMES = ("episodes", *EpisodeEnd._fields[2:])
+_OF_STEPS = ("reward", "blocked", "near", "step_length")
 
 
 class Measures:
@@ -109,7 +110,7 @@ class Measures:
 
     def __init__(self, device: torch.device) -> None:
         self._ended = torch.zeros(len(_NAMES), dtype=torch.float64, device=device)
-        self._steps = torch.zeros(5, dtype=torch.float64, device=device)
+        self._steps = torch.zeros(1 + len(_OF_STEPS), dtype=torch.float64, device=device)
 
     def add(
         self,
@@ -134,18 +135,14 @@ class Measures:
         values = torch.cat([self._ended, self._steps, unplaced.sum(dtype=torch.float64)[None]]).tolist()
         for sums in (self._ended, self._steps, unplaced):
             sums.zero_()
-        ended, steps = dict(zip(_NAMES, values[: len(_NAMES)], strict=True)), max(values[-6], 1.0)
+        count = len(_NAMES)
+        ended, steps = dict(zip(_NAMES, values[:count], strict=True)), max(values[count], 1.0)
         episodes = ended.pop("episodes")
         measures = {"episodes": episodes}
         if episodes > 0:
             measures |= {name: value / episodes for name, value in ended.items()}
-        return measures | {
-            "reward": values[-5] / steps,
-            "blocked": values[-4] / steps,
-            "near": values[-3] / steps,
-            "step_length": values[-2] / steps,
-            "unplaced": values[-1],
-        }
+        of_steps = zip(_OF_STEPS, values[count + 1 : -1], strict=True)
+        return measures | {name: value / steps for name, value in of_steps} | {"unplaced": values[-1]}
 
 
 class NavStep(NamedTuple):
