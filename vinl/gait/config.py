@@ -40,7 +40,7 @@ class GaitConfig:
     hip_height: float = 0.43
     highest_hip: float = 0.47
     lift: float = 0.08
-    edge: float = 0.035
+    edge: float = 0.025
     shank: float = 0.04
     map: bool = True
     modulate: float = 0.4

@@ -21,7 +21,7 @@ START_PHASE = 0.96
 """Phase in which a robot that stands waits for its next command: the legs that go first still bear weight; the others,
 half a period behind, have ended a swing of at most 0.46 of it."""
 
-FREEZE = 0.5
+FREEZE = 0.9
 """A foot that has swung for this fraction of its swing comes down where it was going."""
 
 _RISE = 0.12
@@ -30,7 +30,7 @@ _RISE = 0.12
 _OVER = 0.05
 """A knee under the hip passes this far above a block [m]."""
 
-_CATCH = 0.1
+_CATCH = 0.05
 """Footholds move by the velocity's error times this [s]: a trunk that is too fast is caught by them."""
 
 _MISSED = 0.12

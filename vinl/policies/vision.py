@@ -115,8 +115,20 @@ class GroupNorm(nn.GroupNorm):
     def forward(self, input: Tensor) -> Tensor:
         """Normalised maps of the same shape and type."""
         with torch.autocast(input.device.type, enabled=False):
+            if torch.compiler.is_compiling():
+                return self._in_two_passes(input)
             weight, bias = self.weight.to(input.dtype), self.bias.to(input.dtype)
             return functional.group_norm(input, self.num_groups, weight, bias, self.eps)
+
+    def _in_two_passes(self, input: Tensor) -> Tensor:
+        """The same for ``torch.compile``, which fuses it: its own rule for the derivative subtracts large numbers where
+        a map is nearly constant, as those of an image without depth are."""
+        wide = torch.promote_types(input.dtype, torch.float32)
+        x = input.to(wide).unflatten(1, (self.num_groups, -1)).flatten(3)
+        x = x - x.mean((2, 3), keepdim=True)
+        x = x * torch.rsqrt(x.square().mean((2, 3), keepdim=True) + self.eps)
+        weight, bias = (part.to(wide).view(self.num_groups, -1, 1) for part in (self.weight, self.bias))
+        return (x * weight + bias).reshape(input.shape).to(input.dtype)
 
 
 class _Block(nn.Module):
