@@ -25,8 +25,6 @@ class GaitConfig:
         highest_hip: how far the hips rise while a leg swings over something high [m]: where the thigh hangs straight
             down, the knee would pass through it.
         lift: height of the swing path's apex over what lies below it [m].
-        edge: distance from a foot's surface to a block below which a foothold is forbidden [m].
-        shank: distance from the axis of a shank to a block below which a foothold is forbidden [m].
         map: choose footholds on the map; False: Raibert's as they are, for policies that know no map.
         modulate: largest change of a leg's rate while its foot stands, as a fraction: it meets a block better early or
             late. Swings keep to the period: a leg that should swing slower than it is used to comes down too early.
@@ -40,8 +38,6 @@ class GaitConfig:
     hip_height: float = 0.43
     highest_hip: float = 0.47
     lift: float = 0.08
-    edge: float = 0.025
-    shank: float = 0.04
     map: bool = True
     modulate: float = 0.4
 
@@ -58,7 +54,5 @@ class GaitConfig:
             raise InputError(f"gait.hip_height must lie between {2 * FOOT_RADIUS} and 0.5 m, got {self.hip_height}")
         if not self.hip_height <= self.highest_hip < 0.5:
             raise InputError(f"gait.highest_hip must lie between hip_height and 0.5 m, got {self.highest_hip}")
-        if min(self.edge, self.shank) < 0:
-            raise InputError("gait.edge and gait.shank must not be negative")
         if not 0 <= self.modulate < 1:
             raise InputError(f"gait.modulate must lie in [0, 1), got {self.modulate}")

@@ -40,6 +40,9 @@ _WIDTH = (0.15, 0.10)
 _INWARD = 0.05, 0.03
 """A foothold this much nearer to the other side's feet is free; farther in, so much more costs 1 [m]."""
 
+EDGE, _SHANK = 0.025, 0.04
+"""Footholds are forbidden whose foot is with its surface, whose shank with its axis nearer to a block than this [m]."""
+
 _BLOCKED, _DEEP = (30.0, 12.0), (300.0, 200.0)
 """What a foothold costs whose foot, whose shank is too near to a block, and each metre that it is."""
 
@@ -131,9 +134,9 @@ def obstruction(
     behind = xp.stack([xp.cos(heading), xp.sin(heading)], -1).reshape(-1, 4, *ones, 1, 2) * back[..., None]
     leg = xp.concatenate([points[..., None, :] + behind, (ground[..., None] + up)[..., None]], -1)
     foot = xp.concatenate([points, ground[..., None]], -1)
-    short = xp.amax(config.shank - view.clearance(leg), -1)
+    short = xp.amax(_SHANK - view.clearance(leg), -1)
     too_far = xp.clip(xp.abs(ahead) - farthest(xp, hip), 0.0, None).sum(-1)
-    touches = _price(xp, FOOT_RADIUS + config.edge - view.clearance(foot), 0) + _price(xp, short, 1)
+    touches = _price(xp, FOOT_RADIUS + EDGE - view.clearance(foot), 0) + _price(xp, short, 1)
     return touches + _OUT_OF_REACH * too_far
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Array, Bool, Float
 
 from vinl.gait.clock import swing_fraction
 from vinl.gait.config import GaitConfig
-from vinl.gait.footholds import plan_footholds
+from vinl.gait.footholds import EDGE, plan_footholds
 from vinl.gait.ground_view import FieldView
 from vinl.gait.local_map import POINTS, floor_under
 from vinl.gait.path import swing_path
@@ -41,7 +41,7 @@ class Steps(NamedTuple):
         path_error: (n, 4, 3) from each foot to its path [m]; 0 of feet that stand.
         swing, middle: (n, 4) which feet swing, and are in the middle of it.
         gap: (n, 4) from each leg below the knee to the nearest block or wall [m].
-        blocked: (n, 4) swinging feet whose foothold is on a block or nearer to one than ``gait.edge``.
+        blocked: (n, 4) swinging feet whose foothold is on a block or nearer to one than ``EDGE``.
         speed: (n, 4) of the feet along the ground [m/s].
         height_error: (n, 4) of each hip over its foot, against the gait's [m]; 0 of feet that swing.
     """
@@ -102,7 +102,7 @@ def go_on(
         swing=swing,
         middle=swing & (progress > MIDDLE[0]) & (progress < MIDDLE[1]),
         gap=_leg_gap(view, body, feet),
-        blocked=swing & (view.clearance(gait.target) - FOOT_RADIUS < config.edge),
+        blocked=swing & (view.clearance(gait.target) - FOOT_RADIUS < EDGE),
         speed=jnp.hypot(feet[..., 0] - x, feet[..., 1] - y) / CONTROL_DT,
         height_error=jnp.where(swing, 0.0, hips - feet[..., 2] + FOOT_RADIUS - gait.hip[:, None]),
     )
