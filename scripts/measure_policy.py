@@ -29,8 +29,8 @@ LOCO = {
     "blocks_straight": f"{BLOCKS} --density 1.0 --commands straight",
     "blocks_navigator": f"{BLOCKS} --density 1.0 --commands navigator",
     "no_blocks": f"{BLOCKS} --density 0",
-    "bars": f"{BARS} --seed 4001",
-    "bars_slow": f"{BARS} --speed 0.3 --seed 4002",
+    "bars": f"{BARS} --seed 4003",
+    "bars_slow": f"{BARS} --speed 0.3 --seed 4004",
     "litter": "eval-loco --terrain litter --density 15 --robots 32 --seconds 20 --seed 0",
     "rooms": "eval-loco --terrain rooms --robots 72 --seconds 20 --seed 0 --density 1.0",
 }
