@@ -19,14 +19,9 @@ from vinl.policies.card import PolicyCard, read_card
 from vinl.policies.io import load_policy, save_policy
 
 
-def clean(
-    card: PolicyCard, name: str, start: str | None, commit: str | None, max_speed: float | None = None
-) -> PolicyCard:
+def clean(card: PolicyCard, name: str, start: str | None, commit: str | None) -> PolicyCard:
     """The card under its shipped name, with no measurements of another policy."""
     training: dict[str, Any] = dict(card.training)
-    action = dict(card.action)
-    if max_speed is not None:
-        action["forward_speed"] = [0.0, max_speed]
     if "homes" in training:
         plans = [Path(plan).name for plan in training["homes"].get("plans", ())]
         training["homes"] = training["homes"] | {"plans": plans}
@@ -42,7 +37,7 @@ def clean(
         training["from_policy"] = start
         if training.get("origin"):
             training["origin"] = training["origin"] | {"policy": start}
-    return replace(card, name=name, training=training, action=action, commit=commit or card.commit, evaluation={})
+    return replace(card, name=name, training=training, commit=commit or card.commit, evaluation={})
 
 
 def shipped_trainings() -> dict[str, dict[str, Any]]:
@@ -59,15 +54,10 @@ def main() -> None:
     parser.add_argument("name", help="shipped name")
     parser.add_argument("--half", action="store_true", help="weights as float16")
     parser.add_argument("--from", dest="start", help="what the run started from, as the card is to say it")
-    parser.add_argument("--max-speed", type=float, help="of a navigator: forward speed of action 1 [m/s]")
     parser.add_argument("--commit", help="commit of the code that trained it, when the card does not know")
     options = parser.parse_args()
     policy = load_policy(options.run)
-    if options.max_speed is not None and options.max_speed <= 0:
-        parser.error(f"--max-speed must be positive, got {options.max_speed:g}")
-    if options.max_speed is not None and policy.card.kind != "navigation":
-        parser.error(f"{options.run}: --max-speed is for navigators, this is a {policy.card.kind} policy")
-    card = clean(policy.card, options.name, options.start, options.commit, options.max_speed)
+    card = clean(policy.card, options.name, options.start, options.commit)
     folder = assets_dir() / "policies" / options.name
     save_policy(folder, policy.network, card, options.half)
     for path in folder.iterdir():
