@@ -59,7 +59,7 @@ def test_weights_that_no_training_made_have_no_lineage(tmp_path: Path) -> None:
 
 
 def test_shipped_digests_are_those_of_the_weights() -> None:
-    for name in ("rough", "loco", "nav-blind"):
+    for name in ("rough", "teacher", "loco", "blind", "no_pretraining", "mlp", "nav", "nav-blind"):
         policy = load_policy(name)
         assert policy.card.training["lineage"][-1]["weights_sha256"] == digest_weights(policy.network)
 

@@ -46,8 +46,7 @@ def with_lineage(card: PolicyCard, weights: Mapping[str, Tensor]) -> PolicyCard:
     digest = digest_tensors(weights)
     if "lineage" in training:
         rows = [dict(row) for row in training["lineage"]]
-        if "averaged" not in training:  # the mean of several ends is none of them
-            rows[-1]["weights_sha256"] = digest
+        rows[-1]["weights_sha256"] = digest
     elif card.samples > 0:
         rows = [*past, _own_row(card, digest)]
     else:
