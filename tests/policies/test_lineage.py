@@ -7,7 +7,7 @@ import pytest
 
 from vinl.policies.card import PolicyCard, locomotion_card
 from vinl.policies.identity import digest_weights
-from vinl.policies.io import load_policy, save_policy
+from vinl.policies.io import list_policies, load_policy, save_policy
 from vinl.policies.lineage import find_commit, trace_lineage
 from vinl.policies.networks import StepActor
 
@@ -59,7 +59,7 @@ def test_weights_that_no_training_made_have_no_lineage(tmp_path: Path) -> None:
 
 
 def test_shipped_digests_are_those_of_the_weights() -> None:
-    for name in ("rough", "teacher", "loco", "blind", "no_pretraining", "mlp", "nav", "nav-blind"):
+    for name in list_policies():
         policy = load_policy(name)
         assert policy.card.training["lineage"][-1]["weights_sha256"] == digest_weights(policy.network)
 
