@@ -30,7 +30,7 @@ _RISE = 0.12
 _OVER = 0.05
 """A knee under the hip passes this far above a block [m]."""
 
-_CATCH = 0.07
+_CATCH = 0.1
 """Footholds move by the velocity's error times this [s]: a trunk that is too fast is caught by them."""
 
 _MISSED = 0.12

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from tensordict import TensorDict
 from torch import Tensor, nn
 from torch.nn import functional
@@ -24,13 +24,8 @@ from vinl.rl.step_graph import StepGraph
 from vinl.rl.stopwatch import Stopwatch
 from vinl.robot.observation import PROPRIOCEPTION, PROPRIOCEPTION_SIZE
 
-VELOCITY_UNIT = 0.02
-"""Errors of the velocity count squared up to this, and linearly beyond it [m/s]: squared, the few robots that are
-pushed, slip or fall would outweigh the many that walk, whose maps need the last centimetre per second."""
-
-_DRIFT = 5.0
-"""Weight of a window's mean error beside that of its steps: an error that stays moves the map, one that swings does
-not."""
+VELOCITY_UNIT = 0.2
+"""Unit of the velocity's error in the loss [m/s]."""
 
 _SENSED = slice(PROPRIOCEPTION.place("base_linear_velocity").stop, PROPRIOCEPTION_SIZE)
 """What the robot measures, in the environment's observation."""
@@ -163,13 +158,12 @@ class Distillation:
         totals = torch.zeros(2, device=self.device)
         for _ in range(c.epochs):
             for robots in torch.randperm(n, device=self.device).chunk(parts):
-                errors = self.errors(robots)
-                loss = _price(errors) + _DRIFT * _price(errors.mean(0))
+                loss = self.loss(robots)
                 self.optimizer.zero_grad(set_to_none=True)
-                loss.backward()
+                (loss / VELOCITY_UNIT**2).backward()
                 norm = nn.utils.clip_grad_norm_(self._learned, c.max_grad_norm)
                 self.optimizer.step()
-                totals += torch.stack([errors.square().mean(), norm]).detach()
+                totals += torch.stack([loss, norm]).detach()
         velocity, norm = (totals / (c.epochs * parts)).tolist()
         missed, raised = self._mapping.tolist()
         self._mapping.zero_()
@@ -180,8 +174,8 @@ class Distillation:
             "teacher_share": self.teacher_fraction,
         }
 
-    def errors(self, robots: Int[Tensor, " n"]) -> Float[Tensor, "bptt m 3"]:
-        """Of each component of the velocity in the steps of some robots' windows [m/s]."""
+    def loss(self, robots: Tensor) -> Tensor:
+        """Mean squared error of each component of the velocity in some robots' windows [(m/s)^2]."""
         windows = self.config.steps // self.config.bptt
 
         def cut(buffer: Tensor) -> Tensor:
@@ -191,7 +185,7 @@ class Distillation:
 
         state = tuple(torch.cat([start[:, robots] for start in part], 1) for part in zip(*self._starts, strict=True))
         said, _ = self.student.estimate(cut(self._inputs), state, cut(self._fresh))
-        return said - cut(self._velocity)
+        return functional.mse_loss(said, cut(self._velocity))
 
     # ---- what the loop needs --------------------------------------------------------------------------------------
 
@@ -218,8 +212,3 @@ class Distillation:
         for kept, x in zip(self._state, loaded_dict["memory"], strict=True):
             kept.copy_(x)
         self._begun.copy_(loaded_dict["begun"])
-
-
-def _price(errors: Float[Tensor, "... 3"]) -> Tensor:
-    """Their mean, by Huber's rule: large ones cost what they are [m/s]."""
-    return functional.huber_loss(errors, torch.zeros_like(errors), delta=VELOCITY_UNIT) / VELOCITY_UNIT
