@@ -28,14 +28,9 @@ def bin_heights(heights: np.ndarray) -> np.ndarray:
 
 
 class BlockContacts(NamedTuple):
-    """What touched blocks in one control step, robot by robot.
-
-    Attributes:
-        feet, legs: (n, 4) in the order of ``LEGS``; a leg is hip, thigh and shank.
-        foot_bins, leg_bins: (n, BINS) whether any foot, any leg touched a block of the bin.
-        trunk: (n,) whether the trunk touched a block.
-        walls: (n,) whether anything touched a wall.
-    """
+    """What touched blocks in one control step, robot by robot: feet and legs in the order of ``LEGS`` (a leg is hip,
+    thigh and shank), whether any foot, any leg touched a block of a bin of height, whether the trunk touched one; and
+    whether anything touched a wall."""
 
     feet: Bool[np.ndarray, "n 4"]
     legs: Bool[np.ndarray, "n 4"]
@@ -83,15 +78,7 @@ class Strain(NamedTuple):
 
 class StrainReader(ContactReader):
     """Also notes which feet and legs touch blocks of what height, torques, joint speeds, forces on the feet, and where
-    the robot touches itself.
-
-    Args:
-        model: the world.
-        data: of one robot in it.
-        touches: where to note touches of blocks.
-        strain: where to note the rest.
-        row: the robot's row in both.
-    """
+    the robot touches itself: in its ``row`` of ``touches`` and ``strain``."""
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, touches: BlockContacts, strain: Strain, row: int

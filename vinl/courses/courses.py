@@ -64,11 +64,7 @@ COMMANDS = ("trained", "forward", *FIXED)
 
 
 def choose_commands(name: str | None, terrain: str) -> str:
-    """The commands of that name; without one those of ``DEFAULTS``.
-
-    Raises:
-        InputError: the name is unknown.
-    """
+    """The commands of that name; without one those of ``DEFAULTS``. Raises ``InputError`` if the name is unknown."""
     name = name or DEFAULTS.get(terrain, "trained")
     if name not in COMMANDS:
         raise InputError(f"--commands {name!r} is unknown{closest(name, COMMANDS)}; known: {', '.join(COMMANDS)}")
@@ -96,14 +92,7 @@ def command_ranges(name: str, policies: Sequence[Policy]) -> CommandRanges:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A robot at rest.
-
-    Attributes:
-        x, y: of the trunk [m].
-        yaw: heading [rad].
-        joints: joint angles [rad].
-        ground: height of the ground there [m].
-    """
+    """A robot at rest: x, y [m] and heading [rad] of its trunk, joint angles [rad], height of the ground there [m]."""
 
     x: float
     y: float
@@ -113,20 +102,9 @@ class Start:
 
 
 class Course:
-    """The way of one robot. Commands follow the clock, so that a fall changes nothing of what comes later.
-
-    Args:
-        ground: where.
-        ranges: what commands are drawn from.
-        seed: of the trial.
-        robot: number of the robot.
-        steps: control steps of the trial.
-
-    Attributes:
-        home: index into the ground's homes.
-        commands: (steps, 3) forward, left [m/s] and yaw rate [rad/s] at each control step.
-        fresh: (steps,) whether a new command begins with the step.
-    """
+    """The way of one robot over so many control steps, from the home of a number. Commands (forward, left [m/s], yaw
+    rate [rad/s] at each step; ``fresh`` where a new one begins) follow the clock, so that a fall changes nothing of
+    what comes later."""
 
     def __init__(self, ground: Ground, ranges: CommandRanges, seed: int, robot: int, steps: int) -> None:
         self.robot, self.home = robot, robot % len(ground.homes)

@@ -41,18 +41,8 @@ _GOLDEN = 0.6180339887498949
 
 @dataclass(frozen=True)
 class BarConfig:
-    """Which bar, and how it is approached.
-
-    Attributes:
-        height: of the bar [m].
-        depth: of the bar along the corridor [m].
-        speed: commanded forward speed [m/s].
-        seed: of the starts.
-        kp, kd: gains of the joints.
-
-    Raises:
-        InputError: a number is out of range.
-    """
+    """Height of a bar and its depth along the corridor [m], the commanded forward speed [m/s], the seed of the starts
+    and the gains of the joints. Raises ``InputError`` if a number is out of range."""
 
     height: float
     depth: float
@@ -158,13 +148,8 @@ class CrossingRecord:
 
 @dataclass(frozen=True, eq=False)
 class CrossingTrace:
-    """What pictures need of a crossing.
-
-    Attributes:
-        qpos: (t, 19) after every control step.
-        feet, legs: (t, 4) which of them touched the bar in the control step.
-        trunk: (t,) whether the trunk did.
-    """
+    """What pictures need of a crossing, step by step: where the robot was afterwards, and whether each foot, each leg,
+    the trunk touched the bar."""
 
     qpos: Float[np.ndarray, "t 19"]
     feet: Bool[np.ndarray, "t 4"]
@@ -187,15 +172,8 @@ def cross_bar(
     numbers: Sequence[int],
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> list[Crossing]:
-    """Walk over a bar, steered along the middle of the corridor as a navigator would: by yaw rates alone.
-
-    Args:
-        policy: what drives the robots.
-        config: the bar.
-        ground: see ``build_corridor``.
-        numbers: of the crossings.
-        is_stopped: asked once a second whether to give up.
-    """
+    """Walk over a bar of ``build_corridor``, steered along the middle of the corridor as a navigator would: by yaw
+    rates alone. Once a second it is asked whether to give up."""
     n, starts = len(numbers), [draw_start(config, k) for k in numbers]
     records = [
         CrossingRecord(number, config.height, config.depth, -start.x)

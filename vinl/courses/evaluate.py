@@ -32,15 +32,9 @@ GROUP = 16
 
 @dataclass(frozen=True, eq=False)
 class TrialResults(Generic[Record]):
-    """Records of one policy's robots or crossings, the figures, and what they depend on.
-
-    Attributes:
-        records: in the order of their numbers; crossings by height as asked for, then by number.
-        aggregate: figures of all.
-        policies: digest of the policy's card.
-        config: everything that the run depends on.
-        wall_seconds: how long it took [s].
-    """
+    """Records of one policy's robots in the order of their numbers, or crossings by height as asked for, then by
+    number; the figures of all; the digest of the policy's card; everything that the run depends on; and how long it
+    took [s]."""
 
     records: list[Record]
     aggregate: dict[str, Any]
@@ -64,17 +58,11 @@ def run_groups(
     workers: int,
     on_piece: Callable[[int], None],
 ) -> tuple[list[list[Part]], float]:
-    """Work through all groups in worker processes.
+    """Work through all groups in worker processes. ``work`` gets each group, reports one piece for each of its numbers,
+    and returns what came of them; ``on_piece`` gets how many numbers are done. The numbers of each policy ascend from
+    group to group.
 
-    Args:
-        work: called with each group; reports one piece for each of its numbers, and returns what came of them.
-        shared: what all groups have in common.
-        groups: in any order of the policies, with the numbers of each ascending.
-        workers: processes.
-        on_piece: called with how many numbers are done.
-
-    Returns:
-        What came of the numbers, by policy; how long it took [s].
+    Returns what came of the numbers, by policy, and how long it took [s].
     """
     began, done = time.perf_counter(), itertools.count(1)
     with WorkerPool(min(workers, len(groups)), shared) as pool:
@@ -110,19 +98,13 @@ def compare_locomotors(
     workers: int = 1,
     on_progress: Callable[[str, int, int], None] = lambda *_: None,
 ) -> list[TrialResults[RobotRecord]]:
-    """Let robots follow random commands; a robot that falls starts afresh. Every policy meets the same courses.
+    """Let robots follow random commands for a time [s]; a robot that falls starts afresh. Every policy meets the same
+    courses.
 
-    Args:
-        policies: the locomotors.
-        terrain: one of ``grounds.TERRAINS``.
-        robots: how many for each policy.
-        seconds: how long [s].
-        seed: of terrain, starts and commands.
-        density: blocks or objects per m2; that of ``grounds.DENSITY`` if None.
-        level: level of all robots, for ``rough``; 1 to 9 by turns if None.
-        commands: one of ``courses.COMMANDS``; None: those of ``courses.DEFAULTS``.
-        workers: processes; results do not depend on it.
-        on_progress: called with ``"robot"``, robots done and robots in all.
+    Terrains are ``grounds.TERRAINS``, with ``density`` blocks or objects per m2 (None: ``grounds.DENSITY``) and, of
+    ``rough``, a level for all robots (None: 1 to 9 by turns); commands are one of ``courses.COMMANDS`` (None:
+    ``courses.DEFAULTS``). Results do not depend on the number of workers. ``on_progress`` is called with ``"robot"``,
+    robots done and robots in all.
 
     Raises:
         InputError: a number is out of range or a name unknown.

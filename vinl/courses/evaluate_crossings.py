@@ -57,11 +57,7 @@ _STEPS = {
 
 @dataclass(frozen=True, eq=False)
 class CrossingResults(TrialResults[CrossingRecord]):
-    """Also the traces.
-
-    Attributes:
-        traces: of the first ``TRACED`` crossings of every height [m]; empty if none were asked for.
-    """
+    """Also the traces of the first ``TRACED`` crossings of every height [m]; empty if none were asked for."""
 
     traces: dict[float, list[CrossingTrace]]
 
@@ -88,18 +84,11 @@ def compare_crossings(
     workers: int = 1,
     on_progress: Callable[[str, int, int], None] = lambda *_: None,
 ) -> list[CrossingResults]:
-    """Let robots cross a bar in a corridor 1 m wide. All policies meet the same starts at every height.
+    """Let robots cross bars of these heights and of one depth [m] in a corridor 1 m wide, at a commanded speed [m/s].
+    All policies meet the same starts at every height, as many as there are ``crossings``.
 
-    Args:
-        policies: the locomotion policies.
-        heights: of the bars [m].
-        depth: of the bars, along the corridor [m].
-        speed: commanded forward speed [m/s].
-        crossings: of each policy at each height.
-        seed: of the starts.
-        traced: keep what pictures of the first ``TRACED`` crossings of every height need.
-        workers: processes; results do not depend on it.
-        on_progress: called with ``"crossing"``, crossings done and crossings in all.
+    With ``traced`` what pictures of the first ``TRACED`` crossings of every height need is kept. Results do not depend
+    on the number of workers. ``on_progress`` is called with ``"crossing"``, crossings done and crossings in all.
 
     Raises:
         InputError: a number is out of range, or a policy observes what there is not.

@@ -42,13 +42,8 @@ the near one; it looks at the robot at this height [m]."""
 
 
 def film_crossings(traces: Mapping[str, CrossingTrace], height: float, depth: float, path: Path) -> None:
-    """Film one crossing of each policy, one above another; the bar turns red while it is touched.
-
-    Args:
-        traces: one crossing by policy.
-        height, depth: of the bar [m].
-        path: ``.mp4`` or ``.gif``; a GIF has half the pictures.
-    """
+    """Film one crossing of each policy, one above another, as ``.mp4``, or ``.gif`` with half the pictures; the bar, of
+    this height and depth [m], turns red while it is touched."""
     every = _GIF_EVERY if path.suffix == ".gif" else 1
     write_film(draw_frames(traces, height, depth, every), path, round(1 / CONTROL_DT / SLOWER) / every)
 
@@ -88,14 +83,10 @@ def _near_bar(trace: CrossingTrace) -> list[int]:
 
 
 def draw_feet(traces: Mapping[str, Sequence[CrossingTrace]], height: float, depth: float, path: Path) -> None:
-    """Height of the feet along the corridor, front and rear apart, one row of panels for each policy.
+    """Height of the feet along the corridor with a bar of this height and depth [m], front and rear apart, one row of
+    panels for each policy.
 
     A line is the lowest point of a foot: the first crossing strong, the others faint. Red: it touches the bar.
-
-    Args:
-        traces: crossings by policy.
-        height, depth: of the bar [m].
-        path: of the picture.
     """
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle

@@ -48,14 +48,8 @@ class GaitRecord:
 def record_gait(
     records: Sequence[GaitRecord], strain: Strain, qpos: Float[np.ndarray, "n 19"], rows: Sequence[int] | None = None
 ) -> None:
-    """Add one control step.
-
-    Args:
-        records: of all robots.
-        strain: of the control step.
-        qpos: where the robots are at its end.
-        rows: the robots to count; all by default.
-    """
+    """Add one control step, at whose end the robots are at ``qpos``, to the records of all robots, or to those of
+    ``rows``."""
     feet = foot_positions(np, qpos)
     hips = qpos[:, None, 2] + matrix_of(np, qpos[:, 3:7])[:, 2] @ HIPS.T
     nearest = np.linalg.norm(feet[:, _PAIRS[0]] - feet[:, _PAIRS[1]], axis=-1).min(1)
@@ -74,15 +68,11 @@ def record_gait(
 
 
 def aggregate_gait(records: Sequence[GaitRecord], metres: float) -> dict[str, Any]:
-    """The figures of all robots.
+    """The figures of all robots, which walked so many metres together.
 
     ``cost_of_transport`` is the joints' mechanical work over weight and way; ``leg_leg_per_m`` and ``own_body_per_m``
     are control steps per metre; ``joint_overspeed``, ``feet_close`` and ``foot_above_hip`` are fractions of the control
     steps.
-
-    Args:
-        records: of all robots.
-        metres: that they walked together.
     """
     steps = sum(r.steps for r in records)
     if not steps:
@@ -150,12 +140,10 @@ def aggregate_robots(
     covered: float | None = None,
 ) -> dict[str, Any]:
     """The figures of all robots. ``falls`` is the fraction of robots that fell at least once. ``dirty_steps`` is the
-    fraction of the steps (see ``step_counter``) that touched a block. How they walked: see ``aggregate_gait``.
+    fraction of the steps (see ``StepCounter``) that touched a block. How they walked: see ``aggregate_gait``.
 
-    Args:
-        records: of all robots.
-        height_fractions: fraction of the blocks in every bin of height; without blocks None.
-        covered: fraction of the ground that blocks cover; without blocks None.
+    ``height_fractions`` are the fractions of the blocks in every bin of height, ``covered`` that of the ground under
+    blocks; None without blocks.
     """
     columns = _columns(records)
     n = len(records)
@@ -252,13 +240,8 @@ class StepCounter:
         legs: Bool[np.ndarray, "n 4"],
         counted: Bool[np.ndarray, " n"],
     ) -> None:
-        """One control step of all robots.
-
-        Args:
-            stance: which feet carry, on whatever.
-            feet, legs: which of them touch an object.
-            counted: whose steps count that begin now.
-        """
+        """One control step of all robots: which feet carry, on whatever, which feet and legs touch an object, and whose
+        steps count that begin now."""
         self._changing = np.where(stance == self._down, 0, self._changing + 1)
         # touches of a lift-off belong to the new step, as soon as it is one
         lifting, touches = self._down & (self._changing > 0), np.stack([feet, legs])

@@ -99,19 +99,10 @@ def run_trial(
     policy: Policy,
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> list[RobotRecord]:
-    """Drive all robots of a herd to the end of their commands.
+    """Drive all robots of a herd, one for each course, to the end of their commands, and count, robot by robot.
 
     A robot that falls, or comes to the end of its ground, starts afresh; its commands go on as they would have.
-
-    Args:
-        herd: one robot for each course.
-        ground: what gait and camera see, and how far robots may go.
-        courses: starts and commands.
-        policy: what drives them.
-        is_stopped: asked once a second whether to give up.
-
-    Returns:
-        What was counted, robot by robot.
+    ``is_stopped`` is asked once a second whether to give up.
     """
     n = len(courses)
     levels = [int(ground.levels[course.home]) for course in courses]

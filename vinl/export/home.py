@@ -20,18 +20,11 @@ HOME_FILE, EPISODES_FILE = "home.xml", "episodes.json"
 
 
 def export_home(plan: FloorPlan, out: str | Path, episodes: int = 10, obstacles: str = "paper", seed: int = 0) -> Path:
-    """Write a home and episodes in it, the same as those of ``vinl eval``.
+    """Write a home and episodes in it, the same as those of ``vinl eval``, into a folder.
 
     ``home.xml`` holds the robot, walls and furniture, and a body ``blocks`` without geoms; ``episodes.json`` the time
     limit [s] and for each episode start, goal [m], yaw, joint angles [rad], the shortest path [m] and blocks as rows of
     ``Blocks``.
-
-    Args:
-        plan: walls and furniture.
-        out: folder, made if it is not there.
-        episodes: start/goal pairs.
-        obstacles: clutter, one of ``CLUTTER``.
-        seed: of clutter, heading and joint angles at the start.
 
     Raises:
         InputError: unknown clutter, no such number of episodes, or the folder cannot be written.

@@ -54,13 +54,8 @@ MEANINGS = {
 
 
 def explain_rows(table: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The rows of a card's table with ``meaning``, frame included.
-
-    A row that brings its own ``meaning`` keeps it.
-
-    Raises:
-        InputError: a row is unknown and brings no meaning.
-    """
+    """The rows of a card's table with ``meaning``, frame included; a row that brings its own keeps it. Raises
+    ``InputError`` if a row is unknown and brings none."""
     explained = []
     for row in table:
         name = row["name"]
@@ -83,11 +78,8 @@ FORMAT = 1
 
 
 def describe_step(policy: LocomotionPolicy | DepthPolicy, step: Step) -> dict[str, Any]:
-    """Everything that a program needs to run the policy without vinl. Lengths in m, angles in rad, times in s.
-
-    Raises:
-        InputError: the card observes something that has no meaning here.
-    """
+    """Everything that a program needs to run the policy without vinl. Lengths in m, angles in rad, times in s. Raises
+    ``InputError`` if the card observes something that has no meaning here."""
     card = policy.card
     return {
         "format": FORMAT,

@@ -42,13 +42,8 @@ WALKER = "blind"
 
 @dataclass
 class Sequence:
-    """The steps of one robot from the start of its episode.
-
-    Attributes:
-        observations: (k,) each, scaled.
-        depths: (height, width) each [m]; none if the policy sees none.
-        actions: (a,) each.
-    """
+    """The steps of one robot from the start of its episode: scaled observations (k,), depths (height, width) [m], none
+    if the policy sees none, and actions (a,)."""
 
     observations: list[np.ndarray] = field(default_factory=list)
     depths: list[np.ndarray] = field(default_factory=list)
@@ -59,18 +54,8 @@ class Sequence:
 
 
 class StepRecorder:
-    """A policy that does what another does and writes it down, up to a number of steps.
-
-    Args:
-        policy: that is asked.
-        steps: to write down, of all robots together.
-        on_step: called with how many there are.
-
-    Attributes:
-        card, camera: the policy's.
-        done: the sequences of all episodes so far.
-        ended: rows whose episode is over, which are asked on but no longer written down.
-    """
+    """A policy that does what another does and writes down so many steps of all robots together; ``on_step`` is called
+    with how many there are. Rows whose episode has ended are asked on but no longer written down."""
 
     def __init__(self, policy: LocomotionPolicy | DepthPolicy, steps: int, on_step: Callable[[int], None]) -> None:
         self.card, self.camera = policy.card, policy.camera
@@ -109,14 +94,10 @@ class StepRecorder:
 def record_steps(
     policy: LocomotionPolicy | DepthPolicy, steps: int, on_step: Callable[[int], None] = lambda _: None
 ) -> list[Sequence]:
-    """Walk through a shipped home, through clutter, until a policy was asked so often.
+    """Walk through a shipped home, through clutter, until a policy was asked so often in all episodes together;
+    ``on_step`` is called with the steps so far.
 
     A locomotion policy is driven by the navigator that knows the floor plan, a navigation policy drives ``WALKER``.
-
-    Args:
-        policy: of either kind.
-        steps: of all episodes together.
-        on_step: called with the steps so far.
     """
     recorder, config = StepRecorder(policy, steps, on_step), EvaluationConfig()
     locomotion: Policy = recorder
@@ -152,15 +133,9 @@ LIMIT = 1e-4
 
 @dataclass(frozen=True)
 class Parity:
-    """How the file did.
-
-    Attributes:
-        steps: that were compared.
-        episodes: that they belong to; the memory began anew in each.
-        worst: largest difference between two actions [1].
-        largest: largest action of the policy [1], to judge ``worst`` by.
-        step_ms: median time of a step on one core [ms], the processor's own: others who use it do not count.
-    """
+    """How the file did: steps that were compared, in how many episodes, in each of which the memory began anew; the
+    largest difference between two actions, and the largest action of the policy, to judge it by [1]; the median time of
+    a step on one core [ms], the processor's own: others who use it do not count."""
 
     steps: int
     episodes: int
@@ -175,15 +150,8 @@ class Parity:
 
 
 class ExportedPolicy:
-    """An exported file, run by onnxruntime on one core, with its memory.
-
-    Args:
-        source: path of the file, or what it holds.
-
-    Attributes:
-        about: the file's metadata.
-        inputs, outputs: names and shapes.
-    """
+    """An exported file (its path, or what it holds), run by onnxruntime on one core, with its memory; ``about`` is its
+    metadata."""
 
     def __init__(self, source: str | Path | bytes) -> None:
         import onnxruntime

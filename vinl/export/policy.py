@@ -34,14 +34,8 @@ STEPS = 1000
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written.
-
-    Attributes:
-        title: kind and name of the policy.
-        weights: SHA-256 of the weights, as in the results of an evaluation.
-        inputs, outputs: names and shapes.
-        parity: how far file and policy agree.
-    """
+    """What was written: kind and name of the policy, the SHA-256 of its weights, as in the results of an evaluation,
+    names and shapes of inputs and outputs, and how far file and policy agree."""
 
     title: str
     weights: str
@@ -57,16 +51,10 @@ class ParityError(Exception):
 def export_policy(
     name_or_path: str | Path, out: str | Path, steps: int = STEPS, on_step: Callable[[int], None] = lambda _: None
 ) -> Exported:
-    """Write a policy as an ONNX file that needs nothing of vinl.
+    """Write a policy as an ONNX file that needs nothing of vinl, and say what it takes and gives.
 
-    Args:
-        name_or_path: as for ``load_policy``.
-        out: the file, which ends with ``.onnx``; an older one is replaced.
-        steps: recorded in MuJoCo C, on which file and policy have to agree to ``parity.LIMIT``.
-        on_step: called with the steps recorded so far.
-
-    Returns:
-        What the file takes and gives, and how far it agrees with the policy.
+    File and policy have to agree to ``parity.LIMIT`` on so many steps, recorded in MuJoCo C. ``out`` ends with
+    ``.onnx``; an older file is replaced. ``on_step`` is called with the steps recorded so far.
 
     Raises:
         InputError: the extra ``vinl[export]`` is not installed, there is no such policy, or the file cannot be written.
@@ -95,11 +83,7 @@ def export_policy(
 
 
 def check_file(out: str | Path) -> Path:
-    """A path that may be that of an ONNX file.
-
-    Raises:
-        InputError: it ends otherwise, or is a folder.
-    """
+    """A path that may be that of an ONNX file. Raises ``InputError`` if it ends otherwise, or is a folder."""
     path = Path(out)
     if path.suffix != ".onnx":
         raise InputError(f"--out {path} must end with .onnx")
@@ -113,11 +97,8 @@ PACKAGES = ("onnx", "onnxscript", "onnxruntime")
 
 
 def check_extra() -> None:
-    """Refuse to begin where the extra is not installed.
-
-    Raises:
-        InputError: a package is missing; says how to install it.
-    """
+    """Refuse to begin where the extra is not installed. Raises ``InputError`` if a package is missing; says how to
+    install it."""
     missing = [name for name in PACKAGES if find_spec(name) is None]
     if missing:
         raise InputError(f'export needs {", ".join(missing)}; install it: pip install "vinl[export]"')
@@ -128,11 +109,8 @@ _NOISY = "torch.onnx._internal.exporter._registration"
 
 
 def build_model(policy: LocomotionPolicy | DepthPolicy) -> onnx.ModelProto:
-    """The policy's network for one robot, with its metadata: each value is JSON.
-
-    Raises:
-        InputError: the policy observes or remembers something that cannot be described.
-    """
+    """The policy's network for one robot, with its metadata: each value is JSON. Raises ``InputError`` if the policy
+    observes or remembers something that cannot be described."""
     step = Step(policy).eval()
     about = describe_step(policy, step)
     with torch.no_grad():

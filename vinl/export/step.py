@@ -28,12 +28,8 @@ NEXT = "_next"
 
 @dataclass(frozen=True, eq=False)
 class StateInput:
-    """What a policy remembers from step to step, an input and an output of the file.
-
-    Attributes:
-        name: of the input; the output's ends with ``NEXT``.
-        start: its value when an episode begins, with the shape that it has for one robot.
-    """
+    """What a policy remembers from step to step, an input and an output of the file: the input's name, which ``NEXT``
+    is added to for the output, and the value that an episode begins with, shaped as for one robot."""
 
     name: str
     start: Tensor
@@ -45,9 +41,6 @@ class Step(nn.Module):
     A network that remembers more than an LSTM does, such as its gait, lists all of it in ``state_names`` in the order
     of its ``initial_state``; it then becomes inputs and outputs like any memory. What such a network begins with may
     follow from what it observes first, so that it is told whether an episode begins: by one more state, ``BEGUN``.
-
-    Args:
-        policy: as ``load_policy`` gives it.
 
     Attributes:
         states: what it remembers; empty for a policy without memory.

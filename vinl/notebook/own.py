@@ -45,11 +45,8 @@ class OwnLocomotor:
             self._act.reset(which)  # type: ignore[attr-defined]
 
     def act(self, observation: Float[np.ndarray, "n k"], depth: Any = None) -> Float[np.ndarray, "n 12"]:
-        """Actions of all robots.
-
-        Raises:
-            InputError: the function answered another shape, or numbers that are not finite.
-        """
+        """Actions of all robots. Raises ``InputError`` if the function answered another shape, or numbers that are not
+        finite."""
         seen = observation.astype(np.float32)
         answer = self._act(seen) if self.camera is None else self._act(seen, depth)
         found = np.asarray(answer.detach().cpu() if isinstance(answer, torch.Tensor) else answer, dtype=np.float32)

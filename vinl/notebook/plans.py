@@ -74,15 +74,8 @@ def draw_plan(
     paths: Sequence[Float[np.ndarray, "k 2"]] = (),
     title: str | None = None,
 ) -> Image.Image:
-    """A plan from above.
-
-    Args:
-        plan: the floor plan.
-        blocks: its clutter.
-        routes: a dot with its heading for each start, a ring for each goal.
-        paths: lines of points [m], for example ``walk.trace.path``.
-        title: over the picture; name and free area by default, "" leaves it away.
-    """
+    """A plan from above, with its clutter, a dot with its heading for each start, a ring for each goal, and paths,
+    lines of points [m] such as ``walk.trace.path``; ``title`` is name and free area by default, "" leaves it away."""
     figure = draw_floorplan(open_plan(plan), None, blocks, routes, paths, title)
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=_DPI)

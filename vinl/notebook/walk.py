@@ -182,12 +182,7 @@ def walk(
 
 @dataclass(frozen=True)
 class Film:
-    """A film: show it as the last line of a cell, or open the file.
-
-    Attributes:
-        path: the MP4.
-        width: in the notebook [pixels].
-    """
+    """A film: show it as the last line of a cell, so many pixels wide, or open the MP4 at ``path``."""
 
     path: Path
     width: int = 800
@@ -228,11 +223,8 @@ def show_video(
 
 
 def cut_episode(episode: Episode, start: float, stop: float | None) -> Episode:
-    """The part of an episode from ``start`` to ``stop`` [s], as a film needs it.
-
-    Raises:
-        InputError: no pose lies between them.
-    """
+    """The part of an episode from ``start`` to ``stop`` [s], as a film needs it. Raises ``InputError`` if no pose lies
+    between them."""
     trace, record = episode.trace, episode.record
     first, last = round(start / POSE_DT), len(trace.poses) if stop is None else round(stop / POSE_DT)
     if not 0 <= first < min(last, len(trace.poses)):

@@ -68,14 +68,8 @@ def draw_floor(inside: Bool[np.ndarray, "rows columns"]) -> str:
 
 
 def draw_map(plan: FloorPlan, episodes: Sequence[Episode], first: int, radius: float) -> str:
-    """A floor plan with all paths through it.
-
-    Args:
-        plan: the floor plan.
-        episodes: those of this plan.
-        first: number of the first one on the page; the others follow.
-        radius: of the goals [m].
-    """
+    """A floor plan with all paths of its episodes through it. ``first`` is the number of the first one on the page,
+    ``radius`` that of the goals [m]."""
     cells = np.argwhere(plan.inside)
     low, high = plan.frame.xy(cells.min(0)) - _MARGIN, plan.frame.xy(cells.max(0)) + _MARGIN
     x, y = plan.frame.centres()
@@ -120,13 +114,7 @@ def draw_map(plan: FloorPlan, episodes: Sequence[Episode], first: int, radius: f
 
 
 def draw_histogram(values: Sequence[float], title: str, low: float = 0.0, high: float | None = None) -> str:
-    """A histogram of 20 bars with its mean.
-
-    Args:
-        values: what to count.
-        title: what it is, with its unit.
-        low, high: range; up to the largest value by default.
-    """
+    """A histogram of 20 bars with its mean; its range goes up to the largest value by default."""
     v = np.asarray([x for x in values if np.isfinite(x)], dtype=np.float64)
     top = high if high is not None else _nice(float(v.max()) if len(v) else 1.0)
     counts, _ = np.histogram(np.clip(v, low, top), bins=20, range=(low, top))
@@ -169,11 +157,7 @@ def _nice(value: float) -> float:
 
 
 def render_page(template: str, filters: Mapping[str, Callable[..., Any]], **values: Any) -> str:
-    """A page of ``vinl/render/templates`` as text.
-
-    Raises:
-        ModuleNotFoundError: jinja2 is not there.
-    """
+    """A page of ``vinl/render/templates`` as text. Raises ``ModuleNotFoundError`` if jinja2 is not there."""
     import jinja2  # figures without a page can be had without it
 
     environment = jinja2.Environment(

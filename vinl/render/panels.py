@@ -137,16 +137,8 @@ def write_caption(frame: UInt8[np.ndarray, "height width 3"], text: str) -> UInt
 
 
 def write_film(frames: Iterable[UInt8[np.ndarray, "height width 3"]], path: Path, rate: float) -> None:
-    """Write a film.
-
-    Args:
-        frames: pictures, all of one size; width and height are multiples of 16.
-        path: ``.mp4`` or ``.gif``.
-        rate: pictures a second.
-
-    Raises:
-        OSError: the disk is full, or nothing can be written there.
-    """
+    """Write a film, ``.mp4`` or ``.gif``, of so many pictures a second, all of one size; width and height are multiples
+    of 16. Raises ``OSError`` if the disk is full, or nothing can be written there."""
     path.parent.mkdir(parents=True, exist_ok=True)
     scratch, writer = path.with_name(f".{path.name}"), None
     try:

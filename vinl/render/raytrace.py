@@ -22,12 +22,8 @@ _SUN = np.array([0.35, -0.45, 0.82])
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Where a camera is.
-
-    Attributes:
-        position: (3,) in the world [m].
-        rotation: (3, 3), camera to world: columns are forward, left and up.
-    """
+    """Where a camera is: its position in the world [m], and its rotation, camera to world, whose columns are forward,
+    left and up."""
 
     position: Float[np.ndarray, " 3"]
     rotation: Float[np.ndarray, "3 3"]
@@ -44,12 +40,9 @@ def look_at(eye: Sequence[float] | np.ndarray, target: Sequence[float] | np.ndar
 
 
 class RayRenderer:
-    """Pictures of a world that does not move and of a robot that does.
+    """Pictures of a world that does not move and of a robot that does, of which there may be none.
 
-    Args:
-        scene: the world.
-        bodies: the robot's meshes, see ``RobotShape.bodies``; none for a picture of the world alone.
-        names: the order in which ``render`` gets the bodies' frames; the order of first use by default.
+    ``names`` is the order in which ``render`` gets the frames of the bodies; the order of first use by default.
     """
 
     def __init__(self, scene: Scene, bodies: Sequence[BodyMesh] = (), names: Sequence[str] | None = None) -> None:
@@ -87,22 +80,12 @@ class RayRenderer:
         shadows: int = 1,
         samples: int = 1,
     ) -> UInt8[np.ndarray, "height width 3"]:
-        """One picture.
+        """One picture of width x height pixels, red, green, blue.
 
-        Args:
-            view: where the camera is.
-            width, height: size of the picture [pixels].
-            positions: (b, 3) of the bodies in the world [m], in the order of ``names``, see ``RobotShape.place``.
-            rotations: (b, 3, 3), body to world. Without positions and rotations the robot is not there.
-            hfov: horizontal field of view [rad].
-            shadows: 0 none, 1 the robot's (fast), 2 everything's.
-            samples: rays along each side of a pixel; 2 smooths the edges at four times the cost.
-
-        Returns:
-            (height, width, 3) red, green, blue.
-
-        Raises:
-            ValueError: if the frames do not fit ``names``.
+        ``positions`` [m] and ``rotations`` (body to world) of the bodies are in the order of ``names``, see
+        ``RobotShape.place`` (``ValueError`` if they do not fit); without them the robot is not there. ``hfov`` is the
+        horizontal field of view [rad]. ``shadows``: 0 none, 1 the robot's (fast), 2 everything's. ``samples``: rays
+        along each side of a pixel; 2 smooths the edges at four times the cost.
         """
         body_inputs = self._body_inputs
         if positions is None or rotations is None:
@@ -189,13 +172,10 @@ def _corner_normals(vertices: np.ndarray, faces: np.ndarray) -> Float[np.ndarray
 
 
 class ChaseCamera:
-    """Follows from behind and above; rises, then comes closer, where a wall or a cupboard would hide the robot.
+    """Follows at a distance [m], from behind and an elevation above the horizon [rad]; rises, then comes closer, where
+    a wall or a cupboard would hide the robot. Without a renderer, which knows the walls, the camera flies freely.
 
-    Args:
-        renderer: knows what stands in the way; without one the camera flies freely.
-        distance: from the robot [m].
-        elevation: angle above the horizon while nothing is in the way [rad].
-        smoothing: fraction of the way to the wanted pose that the camera covers at each call, 1 follows at once.
+    At each call it covers a fraction ``smoothing`` of the way to the wanted pose, with 1 all of it.
     """
 
     def __init__(
@@ -210,12 +190,7 @@ class ChaseCamera:
         self._state: np.ndarray | None = None
 
     def follow(self, trunk: Float[np.ndarray, " 3"], yaw: float) -> View:
-        """The camera's pose for the robot's pose; call it once a frame.
-
-        Args:
-            trunk: position [m].
-            yaw: heading [rad].
-        """
+        """The camera's pose for the trunk's position [m] and heading [rad]; call it once a frame."""
         target = np.array([trunk[0], trunk[1], 0.3])
         if self._state is None:
             self._state = np.array([*target, yaw, *self._choose(target, yaw)])

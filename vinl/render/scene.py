@@ -32,16 +32,8 @@ FURNITURE = (
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A world that does not move.
-
-    Attributes:
-        vertices: (v, 3) [m].
-        faces: (f, 3).
-        colours: (f, 3) red, green, blue of every face, 0 to 1.
-        floor: the grid that the floor z = 0 covers.
-        floor_colour: its colour.
-        checker: side of the squares drawn on it [m].
-    """
+    """A world that does not move: vertices [m], faces and their colours, 0 to 1, and a floor z = 0 that covers a grid
+    and is checked with squares of a side [m]."""
 
     vertices: Float[np.ndarray, "v 3"]
     faces: Int[np.ndarray, "f 3"]
@@ -54,15 +46,7 @@ class Scene:
 def plain_scene(
     boxes: Boxes, colours: Sequence[Colour], frame: GridFrame, floor: Colour = FLOOR, checker: float = 0.5
 ) -> Scene:
-    """Coloured boxes on a checked floor.
-
-    Args:
-        boxes: what stands there.
-        colours: one for each box.
-        frame: the floor covers this grid.
-        floor: its colour.
-        checker: side of its squares [m], positive.
-    """
+    """Boxes, each of a colour, on a floor that covers a grid and is checked with squares of a side [m]."""
     # A mesh needs a face; the one below the floor is never seen.
     hidden = np.array([[0, 0, -2], [0.1, 0, -2], [0, 0.1, -2]]), np.array([[0, 1, 2]])
     vertices, faces = join_meshes(box_mesh(boxes), hidden)
@@ -77,15 +61,8 @@ def plan_scene(
     wall_height: float = 1.0,
     furniture_height: float = 1.0,
 ) -> Scene:
-    """A home as a doll's house: no ceiling, walls and tall furniture cut off.
-
-    Args:
-        plan: walls, furniture and grid.
-        blocks: the clutter.
-        goal: where the robot shall go [m]; marked by a thin green square on the floor.
-        wall_height: walls are cut here [m].
-        furniture_height: furniture is cut here [m].
-    """
+    """A home as a doll's house: no ceiling, walls and furniture cut off at these heights [m]. A thin green square on
+    the floor marks the goal [m]."""
     parts, colours = [], []
     for boxes, height, palette in ((plan.walls, wall_height, (WALL,)), (plan.furniture, furniture_height, FURNITURE)):
         cut = boxes.rows[boxes.rows[:, 5] < height - 0.02].copy()
@@ -110,14 +87,8 @@ def plan_scene(
 
 @dataclass(frozen=True, eq=False)
 class BodyMesh:
-    """A coloured mesh that moves with a body.
-
-    Attributes:
-        vertices: (v, 3) in the body's frame [m].
-        faces: (f, 3), counter-clockwise from outside.
-        colour: red, green, blue, 0 to 1.
-        body: name of the body.
-    """
+    """A coloured mesh that moves with the body of a name, in whose frame its vertices are [m]; faces are
+    counter-clockwise from outside."""
 
     vertices: Float[np.ndarray, "v 3"]
     faces: Int[np.ndarray, "f 3"]
@@ -126,12 +97,8 @@ class BodyMesh:
 
 
 class RobotShape:
-    """The robot's visual meshes and its kinematics.
-
-    Attributes:
-        bodies: one mesh for each visual geom.
-        names: the robot's bodies, in the order of the frames that ``place`` returns.
-    """
+    """The robot's visual meshes, one for each visual geom, and its kinematics; ``names`` are its bodies, in the order
+    of the frames that ``place`` returns."""
 
     def __init__(self) -> None:
         self._model = robot_spec("primitives", visual=True).compile()
@@ -140,14 +107,7 @@ class RobotShape:
         self.bodies = robot_bodies(self._model)
 
     def place(self, qpos: Float[np.ndarray, " 19"]) -> tuple[Float[np.ndarray, "b 3"], Float[np.ndarray, "b 3 3"]]:
-        """Where the bodies are.
-
-        Args:
-            qpos: trunk position [m] and quaternion w x y z, joint angles [rad].
-
-        Returns:
-            positions (13, 3) [m] and rotations (13, 3, 3), body to world, in the order of ``names``.
-        """
+        """Positions (13, 3) [m] and rotations (13, 3, 3), body to world, of the bodies in the order of ``names``."""
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self._model, self._data)
         return self._data.xpos[1:].copy(), self._data.xmat[1:].reshape(-1, 3, 3).copy()

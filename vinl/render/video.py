@@ -60,14 +60,8 @@ def name_film(plan: str, seed: int, episode: int) -> str:
 
 
 def film(job: FilmJob, config: EvaluationConfig, is_stopped: Callable[[], bool] = lambda: False) -> str:
-    """Write the film of an episode, whole or not at all.
-
-    Returns:
-        The file's name in the folder.
-
-    Raises:
-        InterruptedRunError: ``is_stopped`` said so.
-    """
+    """Write the film of an episode, whole or not at all, and say what its file is called in the folder. Raises
+    ``InterruptedRunError`` if ``is_stopped`` said so."""
 
     def frames() -> Iterator[UInt8[np.ndarray, "height width 3"]]:
         for frame in draw_frames(job, config):
@@ -147,14 +141,8 @@ _COLOURS = np.array([FLOOR, BLOCK, WALL])
 
 
 def film_state(poses: Float[np.ndarray, "t 19"], texts: list[str], field: HeightField, path: Path) -> None:
-    """Film the poses one after another; from the first that is not finite on, the film stands still.
-
-    Args:
-        poses: (t, 19) position [m] and quaternion of the trunk, joint angles [rad]; the first is finite.
-        texts: one for every pose.
-        field: the ground.
-        path: ``.mp4`` or ``.gif``.
-    """
+    """Film the poses one after another, each with its text, as ``.mp4`` or ``.gif``. From the first that is not finite
+    on, the film stands still; pose 0 must be finite."""
     write_film(draw_state_frames(poses, texts, field), path, RATE)
 
 

@@ -85,15 +85,8 @@ LINK = 0.25
 
 
 def foot_positions(xp: Any, qpos: Any) -> Any:
-    """Middles of the feet.
-
-    Args:
-        xp: ``numpy`` or ``jax.numpy``.
-        qpos: (n, 19) trunk position [m] and unit quaternion w x y z, joint angles [rad].
-
-    Returns:
-        (n, 4, 3) in the world [m], in the order of ``LEGS``.
-    """
+    """Middles of the feet (n, 4, 3) in the world [m], in the order of ``LEGS``, of robots at ``qpos`` (n, 19): trunk
+    position [m], unit quaternion w x y z, joint angles [rad]; for numpy and jax.numpy (``xp``)."""
     return _leg_points(xp, qpos, 1.0)
 
 

@@ -48,16 +48,10 @@ and standing."""
 def make_commands(
     xp: Any, config: CommandConfig, drawn: Float[Any, "*n 5"], hold_step: float = CONTROL_DT
 ) -> tuple[Float[Any, "*n 3"], Int[Any, "*n"]]:
-    """Commands from numbers between 0 and 1.
+    """Commands (..., 3), forward, left [m/s] and yaw rate [rad/s], and the control steps (...) until the next one, from
+    numbers between 0 and 1 in the order of ``UNIFORM``; for numpy and jax.numpy (``xp``).
 
-    Args:
-        xp: ``numpy`` or ``jax.numpy``.
-        config: the ranges.
-        drawn: (..., 5) in the order of ``UNIFORM``.
-        hold_step: the time until the next command is rounded to multiples of this [s], itself one of ``CONTROL_DT``.
-
-    Returns:
-        (..., 3) forward, left [m/s] and yaw rate [rad/s]; (...) control steps until the next command.
+    The time until the next command is rounded to multiples of ``hold_step`` [s], itself one of ``CONTROL_DT``.
     """
     ranges = config.forward, config.left, config.yaw_rate
     forward, left, turn = (low + (high - low) * drawn[..., k] for k, (low, high) in enumerate(ranges))

@@ -24,18 +24,12 @@ def mjcf_path() -> Path:
 
 
 def robot_spec(collision: CollisionSet, visual: bool = False, kp: float = KP, kd: float = KD) -> mujoco.MjSpec:
-    """The robot in an empty world; the caller adds the ground and compiles.
+    """The robot in an empty world; the caller adds the ground and compiles. ``kp`` and ``kd`` are the gains of every
+    joint [N m / rad, N m s / rad]; ``visual`` keeps the visual meshes, which physics does not need.
 
-    Args:
-        collision: ``"spheres"`` for MJX on height fields, ``"primitives"`` for MuJoCo C. The feet are in both.
-        visual: keep the visual meshes, which physics does not need.
-        kp: position gain of every joint [N m / rad].
-        kd: velocity gain of every joint [N m s / rad].
-
-    Returns:
-        A spec with the solver settings of the collision set: one Newton iteration with Euler for the spheres (fast,
-        stable only with eulerdamp off), converged elliptic contacts for the primitives. With the primitives, legs touch
-        each other and the trunk; a link and the one that it is jointed to never do. With the spheres none do.
+    ``"spheres"`` are for MJX on height fields: one Newton iteration with Euler (fast, stable only with eulerdamp off);
+    legs touch nothing of the robot. ``"primitives"`` are for MuJoCo C: converged elliptic contacts; legs touch each
+    other and the trunk, but a link never the one that it is jointed to. The feet are in both.
     """
     spec = mujoco.MjSpec.from_file(str(mjcf_path()))
     unwanted = {group for name, group in _GROUP.items() if name != collision}

@@ -15,15 +15,8 @@ from vinl.robot.rotation import rotate_inverse
 
 @dataclass(frozen=True)
 class ObservationTerm:
-    """One row of the table.
-
-    Attributes:
-        name: what is observed.
-        size: how many numbers.
-        scale: factor from SI units to the network's input, one for each number or one for all.
-        noise: half-width of the uniform noise while training, in SI units.
-        unit: SI unit before scaling.
-    """
+    """One row of the table: name and size, the factor from SI units to the network's input (one for each number or one
+    for all), the half-width of the uniform noise while training in SI units, and the SI unit before scaling."""
 
     name: str
     size: int
@@ -58,11 +51,7 @@ CLIP = 100.0
 
 @dataclass(frozen=True)
 class ObservationTable:
-    """What a policy observes: rows of numbers, one behind the other.
-
-    Attributes:
-        terms: the rows in their order.
-    """
+    """What a policy observes: rows of numbers, one behind the other."""
 
     terms: tuple[ObservationTerm, ...]
 
@@ -85,11 +74,7 @@ class ObservationTable:
         return self.scale * self._per_number([(term.noise,) for term in self.terms])
 
     def place(self, name: str) -> slice:
-        """Where the numbers of a row are.
-
-        Raises:
-            KeyError: no row has this name.
-        """
+        """Where the numbers of a row are. Raises ``KeyError`` if no row has this name."""
         first = 0
         for term in self.terms:
             if term.name == name:
@@ -134,10 +119,11 @@ PROPRIOCEPTION_SIZE, SCAN_SIZE = PROPRIOCEPTION.size, HEIGHT_SCAN.size
 
 
 def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, ground: Any = None) -> Any:
-    """The observation of every robot, without noise.
+    """The observation of every robot without noise, (n, 235) in the order of ``TABLE``, or without ground (n, 48) in
+    that of ``PROPRIOCEPTION``; for numpy and jax.numpy (``xp``). Raises ``ValueError`` if there is another number of
+    points.
 
     Args:
-        xp: ``numpy`` or ``jax.numpy``.
         qpos: (n, 19) trunk position [m] and quaternion, joint angles [rad].
         qvel: (n, 18) trunk velocity in the world [m/s], angular velocity in the body [rad/s], joint speeds [rad/s]
             (MuJoCo's convention for a free joint).
@@ -145,12 +131,6 @@ def observe(xp: Any, qpos: Any, qvel: Any, command: Any, previous_action: Any, g
         previous_action: (n, 12) the network's last output.
         ground: (n, 187) height of the ground under ``SCAN_POINTS`` [m], as ``scan_ground`` reads it; None:
             proprioception alone.
-
-    Returns:
-        (n, 235) in the order of ``TABLE``, or (n, 48) in that of ``PROPRIOCEPTION``.
-
-    Raises:
-        ValueError: another number of points.
     """
     if ground is not None and ground.shape[-1] != SCAN_SIZE:
         raise ValueError(f"the height scan has {SCAN_SIZE} points, got {ground.shape[-1]}")

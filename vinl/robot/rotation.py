@@ -9,16 +9,7 @@ import numpy as np
 
 
 def rotate_inverse(xp: Any, quaternion: Any, vector: Any) -> Any:
-    """Turn world vectors into the body frame.
-
-    Args:
-        xp: ``numpy`` or ``jax.numpy``.
-        quaternion: (..., 4), body to world, unit length.
-        vector: (..., 3).
-
-    Returns:
-        (..., 3), the vectors in the body frame.
-    """
+    """World vectors (..., 3) in the body frame, whose unit quaternions (..., 4) are body to world."""
     w, r = quaternion[..., :1], -quaternion[..., 1:]
     t = 2 * _cross(xp, r, vector)
     return vector + w * t + _cross(xp, r, t)

@@ -34,19 +34,11 @@ def run_depth(
     seconds: float = 2.0,
     homes: int = 8,
 ) -> dict[str, Any]:
-    """Measure the depth camera over homes of about 80 boxes, seen from random places in their rooms.
+    """Measure the depth camera over so many homes of about 80 boxes, seen from random places in their rooms, for so
+    many seconds; by default 4096 images a launch on a GPU and 32 on a CPU.
 
-    Args:
-        num_images: images a launch; 4096 on a GPU and 32 on a CPU by default.
-        width, height: of the images [pixels].
-        device: ``"cpu"``, ``"cuda"`` or ``"cuda:0"``.
-        seconds: how long each of the two kernels is measured [s].
-        homes: how many homes the images are spread over.
-
-    Returns:
-        ``images_per_s`` of the camera, from trunk poses to depth; ``bare_images_per_s`` of a kernel that reads
-        finished rays and writes their length; ``share``, the first over the second; and what was measured:
-        ``num_images``, ``width``, ``height``, ``homes``, ``triangles`` in all homes, ``device``, ``warp``.
+    ``images_per_s`` is the camera's, from trunk poses to depth; ``bare_images_per_s`` that of a kernel that reads
+    finished rays and writes their length; ``share`` the first over the second; ``triangles`` are those of all homes.
 
     Raises:
         InputError: the GPU is not there.

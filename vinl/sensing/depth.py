@@ -20,11 +20,8 @@ Mesh = tuple[np.ndarray, np.ndarray]
 
 
 def build_mesh(vertices: np.ndarray, faces: np.ndarray, device: str, tree: str | None = None) -> wp.Mesh:
-    """A mesh with its ray tree on the device, built in Warp's way of that name, by default of its own choice.
-
-    Raises:
-        InputError: if there is no face, a face names a vertex that is not there, or a vertex is not finite.
-    """
+    """A mesh with its ray tree on the device, built in Warp's way of that name, by default of its own choice. Raises
+    ``InputError`` if there is no face, a face names a vertex that is not there, or a vertex is not finite."""
     vertices, faces = np.asarray(vertices, np.float32), np.asarray(faces, np.int32)
     if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1:] != (3,) or faces.shape[1:] != (3,) or not len(faces):
         raise InputError(f"a mesh needs (v, 3) vertices and (f, 3) faces, got {vertices.shape} and {faces.shape}")
@@ -36,11 +33,7 @@ def build_mesh(vertices: np.ndarray, faces: np.ndarray, device: str, tree: str |
 
 
 def check_device(device: str | torch.device) -> torch.device:
-    """The device, with its number.
-
-    Raises:
-        InputError: if it is a GPU that is not there.
-    """
+    """The device, with its number. Raises ``InputError`` if it is a GPU that is not there."""
     chosen = torch.device(device)
     if chosen.type == "cuda":
         if not torch.cuda.is_available() or not wp.is_cuda_available():
@@ -50,22 +43,15 @@ def check_device(device: str | torch.device) -> torch.device:
 
 
 class DepthCamera:
-    """A depth camera that looks into any of several worlds.
+    """A depth camera that looks into any of several worlds, whose meshes are vertices (v, 3) [m] and faces (f, 3), see
+    ``vinl.world.mesh``.
 
-    Depth is metres along the optical axis (planar, not along the ray); nothing hit, or farther than the camera's far
-    limit, reads as the far limit. The robot's own body is not there.
+    Depth, float32 or float16, is metres along the optical axis (planar, not along the ray); nothing hit, or farther
+    than the camera's far limit, reads as the far limit. The robot's own body is not there.
 
-    Args:
-        meshes: vertices (v, 3) [m] and faces (f, 3) of every world, see ``vinl.world.mesh``.
-        camera: mount, field of view, image size and far limit.
-        device: ``"cpu"``, ``"cuda"`` or ``"cuda:0"``.
-        dtype: ``torch.float32`` or ``torch.float16`` depth.
-        floor: height of a level floor without end that the meshes leave out [m], which makes rays a third quicker;
-            None: what there is of floor is in the meshes.
-
-    Attributes:
-        camera, device, dtype: as given.
-        mesh_ids: Warp's handles of the meshes, world by world, for kernels of one's own.
+    ``floor`` is the height of a level floor without end that the meshes leave out [m], which makes rays a third
+    quicker; None: what there is of floor is in the meshes. ``mesh_ids`` are Warp's handles of the meshes, for kernels
+    of one's own.
 
     Raises:
         InputError: no mesh, a broken mesh, a dtype that is neither of the two, or a GPU that is not there.
@@ -99,16 +85,11 @@ class DepthCamera:
     def render(
         self, world: Any, position: Any, rotation: Any, out: torch.Tensor | None = None
     ) -> Float[torch.Tensor, "n height width"]:
-        """What the camera on each robot sees.
+        """What the camera on each robot sees [m]: in ``world`` (n,), whose range is not checked on a GPU tensor, from
+        the trunk's ``position`` (n, 3) [m] and ``rotation`` (n, 3, 3), trunk to world.
 
-        Args:
-            world: (n,) integers, the world that each robot is in. On a GPU tensor the range is not checked.
-            position: (n, 3) of the trunk [m], numpy or torch, any device.
-            rotation: (n, 3, 3) trunk to world.
-            out: (n, height, width) tensor to write into, of the camera's device and dtype; a new one by default.
-
-        Returns:
-            Depth [m]. On a GPU it is written in order with torch's current stream.
+        It is written into ``out``, of the camera's device and dtype, or a new tensor; on a GPU in order with torch's
+        current stream.
 
         Raises:
             InputError: a shape does not fit, or a world does not exist.
@@ -120,20 +101,9 @@ class DepthCamera:
     def render_poses(
         self, world: Any, position: Any, rotation: Any, out: torch.Tensor | None = None
     ) -> Float[torch.Tensor, "n height width"]:
-        """What a camera sees from given poses, for mounts that differ from image to image.
-
-        Args:
-            world: (n,) integers, the world that each camera is in. On a GPU tensor the range is not checked.
-            position: (n, 3) of the optical centre in the world [m].
-            rotation: (n, 3, 3) camera to world: columns are forward, left and up.
-            out: as in ``render``.
-
-        Returns:
-            Depth [m], as in ``render``.
-
-        Raises:
-            InputError: a shape does not fit, or a world does not exist.
-        """
+        """As ``render``, from the camera's own poses, for mounts that differ from image to image: the optical centre
+        [m], and camera to world, whose columns are forward, left and up. Raises ``InputError`` if a shape does not fit,
+        or a world does not exist."""
         position, rotation = self._on_device(position), self._on_device(rotation)
         _check_shapes(world, position, rotation)
         shape = len(position), self.camera.height, self.camera.width
@@ -189,13 +159,9 @@ def _check_shapes(world: Any, position: torch.Tensor, rotation: torch.Tensor) ->
 
 
 class PreparedRender:
-    """``DepthCamera.render_poses`` of always n images, into the same place.
+    """``DepthCamera.render_poses`` of always n images of float32 on the CPU, into the same place.
 
     For one image of 64 x 36 pixels, wrapping arrays and checking arguments takes as long as the rays themselves.
-
-    Args:
-        depth: what is looked through; it must be on the CPU, with float32 depth.
-        n: images.
     """
 
     def __init__(self, depth: DepthCamera, n: int) -> None:
@@ -221,16 +187,8 @@ class PreparedRender:
         position: Float[np.ndarray, "n 3"],
         rotation: Float[np.ndarray, "n 3 3"],
     ) -> Float[torch.Tensor, "n height width"]:
-        """What cameras see from given poses.
-
-        Args:
-            world: (n,) numbers of meshes; whether there are so many is not checked.
-            position: (n, 3) of the optical centre in the world [m].
-            rotation: (n, 3, 3) camera to world: columns are forward, left and up.
-
-        Returns:
-            Depth [m], overwritten by the next call.
-        """
+        """Depth [m] as in ``render_poses``, overwritten by the next call. Whether there are so many worlds is not
+        checked."""
         self._world[:], self._position[:], self._rotation[:] = world, position, rotation
         self._launch.launch()
         return self._answer

@@ -10,23 +10,13 @@ from vinl.world.grid import GridFrame
 
 
 def scan_ground(xp: Any, heights: Any, frame: GridFrame, qpos: Any) -> Any:
-    """Height of the ground under every scan point, read from the nearest cell of a grid.
+    """Height of the ground [m] under every scan point (n, 187), read from the nearest cell of a grid, (rows, columns)
+    or flat.
 
-    The points of the scan are turned by the trunk's heading (not by its roll and pitch) and moved to the trunk. A
-    point outside the grid reads the grid's nearest edge cell. The frame is static, so under ``jax.jit`` the whole scan
-    is one gather from a flat array.
-
-    Args:
-        xp: ``numpy`` or ``jax.numpy``.
-        heights: (rows * columns,) or (rows, columns), height of the ground [m], rows along y.
-        frame: where the cells lie.
-        qpos: (n, >= 7), trunk position [m] and unit quaternion w x y z; what follows is ignored.
-
-    Returns:
-        (n, 187) heights [m], in the order of ``SCAN_POINTS``.
-
-    Raises:
-        ValueError: if the heights do not have as many cells as the frame.
+    The points, in the order of ``SCAN_POINTS``, are turned by the trunk's heading (not by its roll and pitch) and moved
+    to the trunk, whose position [m] and unit quaternion w x y z begin ``qpos``. A point outside the grid reads the
+    grid's nearest edge cell. The frame is static, so under ``jax.jit`` (``xp`` is ``numpy`` or ``jax.numpy``) the whole
+    scan is one gather from a flat array. Raises ``ValueError`` if the heights do not have as many cells as the frame.
     """
     rows, columns = frame.shape
     flat = heights.reshape(-1)

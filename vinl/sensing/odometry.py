@@ -15,15 +15,8 @@ from vinl.sensing.torch_warp import launch
 class Odometry:
     """The dead reckoning of n robots.
 
-    Args:
-        config: its errors.
-        n: robots.
-        device: where the numbers lie.
-
-    Attributes:
-        config: as given.
-        state: ``estimate`` (n, 3): x, y [m] where they believe to be, and the error of the heading [rad]; ``errors``
-            (n, 2): factor on distances, and heading lost for each metre [rad/m]. What an episode keeps.
+    ``state`` is what an episode keeps: ``estimate`` (n, 3): x, y [m] where they believe to be, and the error of the
+    heading [rad]; ``errors`` (n, 2): factor on distances, and heading lost for each metre [rad/m].
     """
 
     def __init__(self, config: OdometryConfig, n: int, device: torch.device | str = "cpu") -> None:

@@ -14,16 +14,9 @@ MARK = -1.0
 
 
 def prepare_depth(camera: Camera, depth: Float[Tensor, "*n height width"]) -> Float[Tensor, "*n height width"]:
-    """The image that a policy with this camera takes.
-
-    Args:
-        camera: of the policy's card; ``camera.missing`` says what becomes of pixels without a return.
-        depth: along the optical axis [m]; 0, less, or what is no number is a pixel without a return.
-
-    Returns:
-        Depth as a fraction of the far limit, in [0, 1]; ``MARK`` where nothing returned if ``camera.missing`` is
-        ``"plane"``.
-    """
+    """The image that a policy with this camera takes, as a fraction of the far limit, in [0, 1]. ``camera.missing``
+    says what becomes of pixels without a return, which are 0, less, or no number; if it is ``"plane"`` they are
+    ``MARK``."""
     return settle_missing(camera.missing, camera.normalise(depth), ~(depth > 0))
 
 

@@ -16,13 +16,8 @@ from vinl.sensing.torch_warp import allocate_struct, fill_struct, launch
 
 
 def mount_errors(xp: Any, roll: Any, pitch: Any) -> Any:
-    """How cameras are turned that are mounted a little off, (n, 3, 3), for numpy and torch (``xp``).
-
-    Args:
-        xp: ``numpy`` or ``torch``.
-        roll, pitch: (n,) [rad]: first about the camera's own left (nose down is positive), then about its optical axis
-            (right side down).
-    """
+    """How cameras are turned that are mounted a little off, (n, 3, 3), for numpy and torch (``xp``): by pitch [rad]
+    about the camera's own left (nose down is positive), then by roll [rad] about its optical axis (right side down)."""
     cp, sp, cr, sr, zero, one = xp.cos(pitch), xp.sin(pitch), xp.cos(roll), xp.sin(roll), 0 * roll, 0 * roll + 1
     down = xp.stack([cp, zero, sp, zero, one, zero, -sp, zero, cp], -1).reshape(-1, 3, 3)
     side = xp.stack([one, zero, zero, zero, cr, -sr, zero, sr, cr], -1).reshape(-1, 3, 3)
@@ -32,16 +27,8 @@ def mount_errors(xp: Any, roll: Any, pitch: Any) -> Any:
 class DepthSensor:
     """The depth cameras of n robots: what is drawn for each of them, and what becomes of their images.
 
-    Args:
-        config: their errors.
-        camera: the record of the ideal camera.
-        n: robots.
-        device: of the images.
-
-    Attributes:
-        config: as given.
-        drawn: tensors (n, ...) by the names of ``sensor_kernels.Cameras``: what an episode keeps.
-        cameras: the same memory as kernels read it.
+    ``drawn`` is what an episode keeps, tensors (n, ...) by the names of ``sensor_kernels.Cameras``; ``cameras`` is the
+    same memory as kernels read it.
     """
 
     def __init__(self, config: SensorConfig, camera: Camera, n: int, device: torch.device | str = "cpu") -> None:
@@ -66,18 +53,12 @@ class DepthSensor:
         rotation: Float[Tensor, "k 3 3"],
         unit: float = 1.0,
     ) -> Float[Tensor, "k height width"]:
-        """Images as the cameras give them; the very same tensor from an ideal camera.
+        """Depth images, float16 or float32, as the cameras of ``rows`` give them, in new tensors; the very same tensor
+        from an ideal camera. A pixel without a return reads 0, or the far limit where the camera's record leaves images
+        as they are (``Camera.missing``).
 
-        Args:
-            images: depth along the optical axis, float16 or float32.
-            rows: whose images they are, int32.
-            key: int32, that the random numbers of each image follow from.
-            position, rotation: of the optical centres in the world [m], and camera to world.
-            unit: so many metres are 1 in an image.
-
-        Returns:
-            New images of the same type. A pixel without a return reads 0, or the far limit where the camera's record
-            leaves images as they are (``Camera.missing``).
+        The random numbers of each image follow from its ``key``; both are int32. Optical centres are in the world [m],
+        rotations camera to world; ``unit`` metres are 1 in an image.
         """
         if not self.config.spoils or not len(images):
             return images

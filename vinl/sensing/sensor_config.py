@@ -98,11 +98,8 @@ class SensorConfig:
 
 
 def load_sensors(name: str) -> SensorConfig:
-    """The errors of a camera by the name of a config in ``configs/sensors``, or from a YAML file.
-
-    Raises:
-        InputError: there is no such config, or it cannot be used.
-    """
+    """The errors of a camera by the name of a config in ``configs/sensors``, or from a YAML file. Raises ``InputError``
+    if there is no such config, or it cannot be used."""
     return load_config(SensorConfig, name if name.endswith((".yaml", ".yml")) else f"sensors/{name}")
 
 

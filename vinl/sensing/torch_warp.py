@@ -22,11 +22,8 @@ def launch(
 
 
 def allocate_struct(kind: Any, n: int, device: torch.device | str) -> tuple[Any, dict[str, torch.Tensor]]:
-    """A struct of arrays of n rows, all zero.
-
-    Returns:
-        The struct, for kernels, and the same memory as tensors (n, ...) by the names of its fields.
-    """
+    """A struct of arrays of n rows, all zero, for kernels, and the same memory as tensors (n, ...) by the names of its
+    fields."""
     record, tensors = kind(), {}
     for name, field in kind.vars.items():
         row = wp.to_torch(wp.zeros(1, dtype=field.type.dtype, device="cpu"))

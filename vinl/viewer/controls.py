@@ -48,15 +48,8 @@ _KEYS = "Keys: `I` faster, `K` slower, `J` left, `L` right, `O` stop; `P` pause,
 
 
 class Controls:
-    """The panel of a live session.
-
-    Args:
-        gui: of a viser server.
-        ask: puts a request into the session's queue.
-        plans: names to choose from, the present one first.
-        locomotion, navigation: policies to choose from, by what they are called; the present one first.
-        obstacles: the preset of clutter that the session began with.
-    """
+    """The panel of a live session. ``plans``, ``locomotion`` and ``navigation`` are what can be chosen, the present one
+    first; ``ask`` puts a request into the session's queue."""
 
     def __init__(
         self,
@@ -163,14 +156,7 @@ class Controls:
 
 
 class ReplayControls:
-    """The panel of a recording.
-
-    Args:
-        gui: of a viser server.
-        ask: puts a request into the session's queue.
-        labels: of the episodes.
-        number: of the one that is shown.
-    """
+    """The panel of a recording; ``number`` is the episode that is shown."""
 
     def __init__(
         self, gui: viser.GuiApi, ask: Callable[[Request], None], labels: Sequence[str], number: int, snapshot: Snapshot

@@ -61,16 +61,9 @@ def look_through(
 
 
 class LiveChain:
-    """One robot in a world, driven by its policies.
-
-    Args:
-        world: where it walks.
-        locomotion: locomotion policy, or its name or folder; None: the best shipped one.
-        navigation: navigator, or its name or folder.
-        config: rules of the evaluation: how often the navigator decides, what is a fall, what a goal reached; errors
-            of cameras and odometry, faults of the body.
-        seed: of what is drawn: clutter, dropped blocks, errors.
-    """
+    """One robot in a world, driven by its policies, given as such or by name or folder. What is drawn (clutter, dropped
+    blocks, errors) follows from the seed; ``config`` has how often the navigator decides, what is a fall, what a goal
+    reached, errors of cameras and odometry, faults of the body."""
 
     dt = CONTROL_DT
     """Time of a step [s]."""
@@ -94,14 +87,8 @@ class LiveChain:
     # ---- from outside ----------------------------------------------------------------------------------------------
 
     def apply(self, request: Request) -> str:
-        """Do what is asked.
-
-        Returns:
-            What there is to say about it; empty for nothing.
-
-        Raises:
-            InputError: it cannot be done; nothing has changed then.
-        """
+        """Do what is asked, and say what there is to say about it; empty for nothing. Raises ``InputError`` if it
+        cannot be done; nothing has changed then."""
         match request:
             case Reset():
                 self._put_down(self._home)
@@ -132,11 +119,7 @@ class LiveChain:
         return ""
 
     def step(self) -> bool:
-        """One control step.
-
-        Returns:
-            Whether time should stop: the robot has just fallen.
-        """
+        """One control step; whether time should stop, because the robot has fallen."""
         if self._state == "fallen":
             return True
         qpos, qvel = self._walker.qpos[None].copy(), self._walker.qvel[None].copy()

@@ -28,11 +28,7 @@ _NAVIGATION = "nav"
 
 
 def require_viser(what: str) -> None:
-    """Refuse where viser is not installed.
-
-    Raises:
-        InputError: it is not.
-    """
+    """Refuse where viser is not installed. Raises ``InputError`` if it is not."""
     if find_spec("viser") is None:
         raise InputError(f'{what} needs viser, which only the viewer uses; install it: pip install "vinl[viewer]"')
 

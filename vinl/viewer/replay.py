@@ -28,15 +28,7 @@ _LIMBS = ("foot", "leg", "trunk")
 
 
 class Replay:
-    """Plays recorded episodes.
-
-    Args:
-        shelf: where they are.
-        number: of the first one to show.
-
-    Raises:
-        InputError: there is no such episode.
-    """
+    """Plays recorded episodes, ``number`` first. Raises ``InputError`` if there is no such episode."""
 
     dt = POSE_DT
     """Time between two recorded poses [s]."""

@@ -30,11 +30,8 @@ def list_runs(row: Bool[np.ndarray, " columns"]) -> list[tuple[int, int]]:
 
 
 def inside_mesh(plan: FloorPlan) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "f 3"]]:
-    """The floor inside the building at z = 0, seen from above.
-
-    Returns:
-        vertices (v, 3) float32 [m] and faces (f, 3); some lie on one another.
-    """
+    """The floor inside the building at z = 0, seen from above: vertices (v, 3) float32 [m] and faces (f, 3); some lie
+    on one another."""
     rectangles, half = split_rectangles(plan.inside), plan.frame.resolution / 2
     low, high = plan.frame.xy(rectangles[:, :2]) - half, plan.frame.xy(rectangles[:, 2:]) - half
     corners = np.stack([low, np.stack([high[:, 0], low[:, 1]], 1), high, np.stack([low[:, 0], high[:, 1]], 1)], 1)
@@ -88,17 +85,8 @@ _HIDDEN = np.array([[0.0, 0.0, -100.0]], np.float32)
 
 
 class SceneView:
-    """The 3D part of the page.
-
-    Everything hangs below one frame. To follow the robot, that frame moves and not the browser's camera: whoever looks
-    turns and zooms freely meanwhile.
-
-    Args:
-        scene: of a viser server.
-
-    Attributes:
-        follows: whether the view follows the robot.
-    """
+    """The 3D part of the page. Everything hangs below one frame. To follow the robot (``follows``), that frame moves
+    and not the browser's camera: whoever looks turns and zooms freely meanwhile."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene, self._shape = scene, RobotShape()

@@ -137,12 +137,8 @@ class DepthImage:
 
 @dataclass(frozen=True, eq=False)
 class Footholds:
-    """Where the feet are to come down, in the world frame; legs in the order of ``LEGS``.
-
-    Attributes:
-        planned: (4, 3) chosen on the map of the ground [m]; None: the controller plans none.
-        predicted: (4, 3) read from depth images by the policy [m]; None: it predicts none.
-    """
+    """Where the feet are to come down in the world frame [m], as chosen on the map of the ground, and as read from
+    depth images by the policy; legs in the order of ``LEGS``. None: there are none."""
 
     planned: Float[np.ndarray, "4 3"] | None = None
     predicted: Float[np.ndarray, "4 3"] | None = None
@@ -236,18 +232,10 @@ class Source(Protocol):
 
 
 class Session:
-    """Steps a source at the pace of time.
+    """Steps a source at the pace of time; 1 is real time.
 
     The source is touched by the session's thread alone. Others ask through ``ask`` and read ``snapshot``, which is
-    replaced as a whole after every step.
-
-    Args:
-        source: a live robot or a recording.
-        pace: how fast time goes; 1 is real time.
-        paused: whether it begins with time standing still.
-
-    Attributes:
-        error: what ended the session, if anything did.
+    replaced as a whole after every step. ``error`` is what ended the session, if anything did.
     """
 
     def __init__(self, source: Source, pace: float = 1.0, paused: bool = False) -> None:

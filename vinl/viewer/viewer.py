@@ -100,22 +100,9 @@ _CAMERA, _FIELD = (-3.0, -2.2, 2.6), math.radians(50)
 
 
 class Viewer:
-    """A session in the browser.
-
-    Args:
-        session: started, or not yet.
-        title: shown on top of the panel.
-        host: address to listen on; ``0.0.0.0`` lets other machines in.
-        port: to listen on; 0 for any free one.
-
-    Attributes:
-        session: what is shown.
-        error: what ended the drawing, if anything did.
-        url: where to look.
-
-    Raises:
-        InputError: the port is taken, or may not be used.
-    """
+    """A session, started or not yet, in the browser, on a port of an address (port 0: any free one; ``0.0.0.0`` lets
+    other machines in), at ``url``. ``error`` is what ended the drawing, if anything did. Raises ``InputError`` if the
+    port is taken, or may not be used."""
 
     def __init__(self, session: Session, title: str, host: str = "127.0.0.1", port: int = 8080) -> None:
         self.session, self._closing = session, threading.Event()
@@ -177,11 +164,7 @@ class Viewer:
             self._server.stop()
 
     def wait(self) -> None:
-        """Until the session or the drawing fails.
-
-        Raises:
-            BaseException: what it failed with.
-        """
+        """Until the session or the drawing fails, whose error is raised."""
         while True:
             error = self.session.error or self.error
             if error is not None:
@@ -273,11 +256,8 @@ def meet_floor(scene: SceneView, event: viser.SceneClickEvent) -> tuple[float, f
 
 
 def open_server(host: str, port: int, title: str) -> viser.ViserServer:
-    """A viser server on exactly this port; viser itself would take the next free one.
-
-    Raises:
-        InputError: the port is taken, or may not be used, or there is no such address here.
-    """
+    """A viser server on exactly this port; viser itself would take the next free one. Raises ``InputError`` if the port
+    is taken, or may not be used, or there is no such address here."""
     with socket.socket() as trial:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -36,14 +36,7 @@ _BAR_EVERY, _BAR_DEPTH = 1.5, 0.2
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """A floor plan with its clutter, and where the robot starts.
-
-    Attributes:
-        plan: walls, furniture and free floor.
-        blocks: the clutter.
-        start: (3,) x, y [m] and yaw [rad].
-        joints: (12,) joint angles at the start [rad].
-    """
+    """A floor plan with its clutter, and where the robot starts: x, y [m], yaw [rad], and its joint angles [rad]."""
 
     plan: FloorPlan
     blocks: Blocks
@@ -55,11 +48,7 @@ class World:
         return replace(self, blocks=blocks)
 
     def with_block(self, block: Blocks, robot: Float[np.ndarray, "2"]) -> World:
-        """One more block.
-
-        Raises:
-            InputError: it would lie on the robot, whose middle is at ``robot`` [m].
-        """
+        """One more block. Raises ``InputError`` if it would lie on the robot, whose middle is at ``robot`` [m]."""
         if block.boxes().distances(robot[None]).min() < TOO_CLOSE:
             raise InputError("no block fits there: the robot is in the way")
         return self.with_blocks(self.blocks + block)
@@ -84,27 +73,17 @@ def draw_block(xy: Float[np.ndarray, "2"], rng: np.random.Generator) -> Blocks:
 
 
 def open_home(plan: FloorPlan, obstacles: str, seed: int, config: EvaluationConfig) -> World:
-    """A home, with robot and clutter as in its first episode with this seed.
-
-    Raises:
-        InputError: the preset is unknown, or the plan has no room.
-    """
+    """A home, with robot and clutter as in its first episode with this seed. Raises ``InputError`` if the preset is
+    unknown, or the plan has no room."""
     preset = choose_clutter(obstacles)
     setup = draw_setup(plan, draw_routes(plan, 1, config)[0], 0, seed, preset, config)
     return World(plan, setup.blocks, np.array([*setup.route.start, setup.yaw]), setup.joints)
 
 
 def open_ground(terrain: str, seed: int, density: float | None = None) -> World:
-    """Ground such as ``vinl eval-loco`` tries a locomotion policy on, with a fence around it.
-
-    Args:
-        terrain: one of ``OPEN_GROUNDS``.
-        seed: of blocks and litter.
-        density: blocks per m2, by default 1, or objects of litter per m2, by default 10.
-
-    Raises:
-        InputError: there is no such ground.
-    """
+    """One of ``OPEN_GROUNDS``, such as ``vinl eval-loco`` tries a locomotion policy on, with a fence around it;
+    ``density`` is in blocks per m2, by default 1, or objects of litter per m2, by default 10. Raises ``InputError`` if
+    there is no such ground."""
     if terrain not in OPEN_GROUNDS:
         known = ", ".join(OPEN_GROUNDS)
         raise InputError(f"--terrain {terrain!r} cannot be played{closest(terrain, OPEN_GROUNDS)}; known: {known}")

@@ -58,14 +58,11 @@ class _Table(ABC):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Boxes(_Table):
-    """Boxes that stand upright, turned about the vertical axis only.
+    """Boxes that stand upright, turned about the vertical axis only, one a row: x, y of the centre [m], yaw [rad],
+    length along the box's own x axis [m], width along its own y axis [m], bottom z [m], top z [m].
 
-    Attributes:
-        rows: shape (n, 7), one box a row: x, y of the centre [m], yaw [rad], length along the box's own x axis [m],
-            width along its own y axis [m], bottom z [m], top z [m].
-
-    Raises:
-        InputError: if the shape is wrong, a number is not finite or beyond ``FARTHEST``, or a size is not positive.
+    Raises ``InputError`` if the shape is wrong, a number is not finite or beyond ``FARTHEST``, or a size is not
+    positive.
     """
 
     WIDTH: ClassVar[int] = 7
@@ -107,14 +104,8 @@ class Boxes(_Table):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Blocks(_Table):
-    """Blocks that lie on the floor z = 0: height field, collision boxes, mesh and drawing derive from them.
-
-    Attributes:
-        rows: shape (n, 6), one block a row: x, y of the centre [m], yaw [rad], length [m], width [m], height [m].
-
-    Raises:
-        InputError: as for ``Boxes``.
-    """
+    """Blocks that lie on the floor z = 0, one a row: x, y of the centre [m], yaw [rad], length, width, height [m].
+    Height field, collision boxes, mesh and drawing derive from them. Raises ``InputError`` as ``Boxes`` do."""
 
     WIDTH: ClassVar[int] = 6
 

@@ -47,11 +47,8 @@ CLUTTER = {
 
 
 def choose_clutter(name: str, what: str = "--obstacles") -> ClutterPreset:
-    """A preset by its name; ``what`` stands before it in the error.
-
-    Raises:
-        InputError: there is none of that name.
-    """
+    """A preset by its name; ``what`` stands before it in the error. Raises ``InputError`` if there is none of that
+    name."""
     if name not in CLUTTER:
         raise InputError(f"{what} {name!r} is not a preset{closest(name, CLUTTER)}; known: {', '.join(CLUTTER)}")
     return CLUTTER[name]
@@ -60,16 +57,11 @@ def choose_clutter(name: str, what: str = "--obstacles") -> ClutterPreset:
 def scatter_blocks(
     plan: FloorPlan, preset: ClutterPreset, rng: np.random.Generator, keep_clear: Float[np.ndarray, "k 2"]
 ) -> Blocks:
-    """Scatter blocks on the free floor: any yaw, none in a wall or in furniture, none near the points to keep clear.
+    """Scatter blocks on the free floor: any yaw, none in a wall or in furniture, none within ``preset.clear`` of the
+    points to keep clear [m].
 
     Blocks are tried one after another at random places until the density is reached; where narrow floor has no more
     room there are fewer.
-
-    Args:
-        plan: the floor plan.
-        preset: how many, how large, how far apart.
-        rng: the only source of chance.
-        keep_clear: points [m], start and goal, around which ``preset.clear`` stays free.
     """
     keep_clear = np.asarray(keep_clear, dtype=np.float64).reshape(-1, 2)
     spots = plan.frame.xy(np.argwhere(plan.free))
@@ -126,13 +118,8 @@ LITTER_HEIGHT = (0.03, 0.10)
 
 
 def draw_litter(rng: np.random.Generator, density: float, half: float) -> Blocks:
-    """Objects at random places of the square |x|, |y| <= half, with any yaw; they may lie on one another.
-
-    Args:
-        rng: the only source of chance.
-        density: objects per m2.
-        half: half the side of the square [m].
-    """
+    """Objects, ``density`` per m2, at random places of the square |x|, |y| <= half [m], with any yaw; they may lie on
+    one another."""
     n = round(density * (2 * half) ** 2)
     places, yaw = rng.uniform(-half, half, (n, 2)), rng.uniform(0, np.pi, n)
     return Blocks(np.column_stack([places, yaw, rng.uniform(*LITTER_SIDE, (n, 2)), rng.uniform(*LITTER_HEIGHT, n)]))

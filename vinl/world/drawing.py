@@ -30,18 +30,11 @@ def draw_floorplan(
     paths: Sequence[Float[np.ndarray, "k 2"]] = (),
     title: str | None = None,
 ) -> Figure:
-    """Draw a plan from above: floor, furniture, walls, panes, room names and, if given, what happens in it.
+    """Draw a plan from above: floor, furniture, walls, panes and room names; and, if given, clutter, a dot with its
+    heading for each start, a ring for each goal, and paths [m].
 
-    Args:
-        plan: the floor plan.
-        axes: where to draw; ``None`` makes a figure of its own, to scale.
-        blocks: clutter.
-        start_goals: a dot with its heading for each start, a ring for each goal.
-        paths: lines of points [m].
-        title: over the picture; ``None`` takes the plan's name and free area, "" leaves it away.
-
-    Returns:
-        The figure, not yet saved. It belongs to no window system.
+    Without ``axes`` a figure of its own is made, to scale. ``title`` is the plan's name and free area by default, ""
+    leaves it away. The figure is not yet saved and belongs to no window system.
     """
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import ListedColormap
@@ -101,11 +94,8 @@ def draw_floorplan(
 
 
 def save_floorplan(plan: FloorPlan, out: str | Path, dpi: int = 100, **drawn) -> Path:
-    """Draw a plan (arguments as in ``draw_floorplan``) and save it as PNG; folders are made as needed.
-
-    Raises:
-        InputError: if the file cannot be written.
-    """
+    """Draw a plan (arguments as in ``draw_floorplan``) and save it as PNG; folders are made as needed. Raises
+    ``InputError`` if the file cannot be written."""
     return _save(draw_floorplan(plan, **drawn), out, dpi)
 
 
@@ -122,11 +112,8 @@ def _save(figure: Figure, out: str | Path, dpi: int) -> Path:
 
 
 def save_contact_sheet(plans: Sequence[FloorPlan], out: str | Path, columns: int = 5, dpi: int = 80) -> Path:
-    """Draw many plans beside one another, each to its own scale, and save them as one PNG.
-
-    Raises:
-        InputError: if the file cannot be written, or there are no plans.
-    """
+    """Draw many plans beside one another, each to its own scale, and save them as one PNG. Raises ``InputError`` if the
+    file cannot be written, or there are no plans."""
     from matplotlib.figure import Figure
 
     if not plans:

@@ -17,13 +17,8 @@ or to and fro. At the speeds of the paper one that only took a long path around 
 
 
 def name_late_end(stuck: bool, moved_m: float, shortest_m: float) -> str:
-    """Why an episode ran out of time.
-
-    Args:
-        stuck: the robot no longer got anywhere; each simulator has its own way to see that.
-        moved_m: the path that it made [m].
-        shortest_m: the shortest path from start to goal [m].
-    """
+    """Why an episode ran out of time: the robot no longer got anywhere (each simulator has its own way to see that), or
+    its path was long beside the shortest one [m]."""
     if stuck:
         return STUCK
     return LOOPING if moved_m > LOOPING_PATHS * shortest_m else TIMEOUT

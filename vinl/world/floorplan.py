@@ -96,11 +96,8 @@ class FloorPlan:
 def frame_around(
     low: Float[np.ndarray, " 2"], high: Float[np.ndarray, " 2"], source: str, resolution: float = RESOLUTION
 ) -> GridFrame:
-    """A grid frame that holds the rectangle from ``low`` to ``high`` [m] and ``MARGIN`` around it.
-
-    Raises:
-        InputError: if the plan would be beyond all reason large.
-    """
+    """A grid frame that holds the rectangle from ``low`` to ``high`` [m] and ``MARGIN`` around it. Raises
+    ``InputError`` if the plan would be beyond all reason large."""
     low, high = np.asarray(low), np.asarray(high)
     if not (np.maximum(np.abs(low), np.abs(high)) <= FARTHEST).all():
         raise InputError(

@@ -29,19 +29,12 @@ and 8 cm for sway and steering at 2 Hz. On a grid of 5 cm a doorway of 0.6 m sti
 
 @dataclass(frozen=True, eq=False)
 class FreeSpace:
-    """The part of a floor plan where the middle of the robot may be.
+    """The part of a floor plan where the middle of a robot may be whose footprint has a radius [m].
 
-    Attributes:
-        plan: the floor plan.
-        radius: footprint radius that the free floor is eroded by [m].
-        clearance: shape (rows, columns), distance to the nearest wall, furniture or outside [m].
-        traversable: shape (rows, columns), clearance of at least ``radius``.
-        regions: shape (rows, columns), number of the connected region from 1 on, 0 where not traversable. Cells join
-            over edges only, so that two regions never touch.
-        largest: number of the region with most cells.
-
-    Raises:
-        InputError: if the robot fits nowhere.
+    ``clearance`` is the distance to the nearest wall, furniture or outside [m]; ``traversable`` where it is at least
+    the radius; ``regions`` number what is connected, from 1 on, 0 where not traversable. Cells join over edges only, so
+    that two regions never touch; ``largest`` is the number of the one with most cells. Raises ``InputError`` if the
+    robot fits nowhere.
     """
 
     plan: FloorPlan
@@ -81,19 +74,9 @@ PATH_SPACING = 0.1
 def distance_field(
     traversable: Bool[np.ndarray, "rows columns"], frame: GridFrame, goal_xy: Float[np.ndarray, " 2"]
 ) -> Float[np.ndarray, "rows columns"]:
-    """Length of the shortest path to the goal from every cell.
-
-    Args:
-        traversable: where the robot's middle may be.
-        frame: where the cells lie.
-        goal_xy: goal [m]; off the traversable floor, the nearest cell within ``SNAP`` stands for it.
-
-    Returns:
-        float32 [m], infinite where the goal cannot be reached from.
-
-    Raises:
-        InputError: if no traversable cell is near the goal.
-    """
+    """Length of the shortest path to the goal from every cell, float32 [m]; infinite where none leads there. For a goal
+    off the traversable floor the nearest cell within ``SNAP`` stands. Raises ``InputError`` if no traversable cell is
+    near the goal."""
     goal = _nearest_cell(traversable, frame, goal_xy)
     return (_spread(traversable, goal) * frame.resolution).astype(np.float32)
 
@@ -124,10 +107,8 @@ def comfortable_path(
 ) -> Float[np.ndarray, "k 2"]:
     """A path for a robot to follow: short, but through the middle of doors and away from walls where there is space.
 
-    Floor with less clearance than ``room`` [m] costs up to five times its length, the nearer the wall the more.
-
-    Returns:
-        Points [m] at most ``PATH_SPACING`` apart from start to goal, smoothed over 0.3 m.
+    Floor with less clearance than ``room`` [m] costs up to five times its length, the nearer the wall the more. The
+    points [m] are at most ``PATH_SPACING`` apart, smoothed over 0.3 m.
 
     Raises:
         InputError: if the goal cannot be reached from the start.

@@ -61,16 +61,8 @@ GROUND, BLOCK, WALL = 0, 1, 2
 
 @dataclass(frozen=True, eq=False)
 class HeightField:
-    """Heights and labels on one grid.
-
-    Attributes:
-        heights: (rows, columns) height of every vertex [m].
-        labels: (rows, columns) ``GROUND``, ``BLOCK`` or ``WALL``.
-        frame: where the vertices lie.
-
-    Raises:
-        InputError: if the shapes differ or a height is not finite.
-    """
+    """Heights [m] and labels (``GROUND``, ``BLOCK`` or ``WALL``) of the vertices of one grid. Raises ``InputError`` if
+    the shapes differ or a height is not finite."""
 
     heights: Float[np.ndarray, "rows columns"]
     labels: UInt8[np.ndarray, "rows columns"]
@@ -92,15 +84,8 @@ def flat_field(frame: GridFrame) -> HeightField:
 
 
 def raise_boxes(field: HeightField, boxes: Boxes, label: int) -> None:
-    """Write boxes into a height field in place: every vertex inside a footprint rises to the box's top.
-
-    Boxes that stand on another are not told apart: the higher top wins, and so does the higher label.
-
-    Args:
-        field: changed in place.
-        boxes: what to write.
-        label: ``BLOCK`` or ``WALL``.
-    """
+    """Write boxes into a height field in place, with the label ``BLOCK`` or ``WALL``: every vertex inside a footprint
+    rises to the box's top. Where several boxes stand, the highest top wins, and so does the highest label."""
     for top, near, beyond in _look_around(field.frame, boxes, field.frame.resolution):
         inside, heights, labels = beyond.max(-1) <= 1e-9, field.heights[near], field.labels[near]
         heights[inside] = np.maximum(heights[inside], top)
@@ -127,16 +112,8 @@ FAR = 0.25
 def block_distances(
     frame: GridFrame, boxes: Boxes
 ) -> tuple[Float[np.ndarray, "rows columns"], Float[np.ndarray, "rows columns"]]:
-    """The nearest footprint of every vertex.
-
-    Args:
-        frame: of the grid.
-        boxes: that stand on the floor.
-
-    Returns:
-        Signed distance to the edge of the nearest footprint, negative inside, at most ``FAR`` [m], and its top [m]
-        (0 where none is near).
-    """
+    """Signed distance of every vertex of the grid to the edge of the nearest footprint, negative inside, at most
+    ``FAR`` [m], and the box's top [m] (0 where none is near)."""
     distance, top = np.full(frame.shape, FAR, np.float32), np.zeros(frame.shape, np.float32)
     for high, near, beyond in _look_around(frame, boxes, FAR):
         d = np.hypot(*np.moveaxis(np.maximum(beyond, 0), -1, 0)) + np.minimum(beyond.max(-1), 0)
@@ -147,17 +124,9 @@ def block_distances(
 
 
 def clearance(xp: Any, distance: Any, top: Any, frame: GridFrame, points: Any) -> Any:
-    """Distance of points from the nearest block, negative inside it. The same code for numpy and jax.numpy.
-
-    Args:
-        xp: ``numpy`` or ``jax.numpy``.
-        distance, top: (rows * columns,) as ``block_distances`` gives them, flattened.
-        frame: of the grid.
-        points: (..., 3) [m].
-
-    Returns:
-        (...,) distance [m]; exact to about 3 mm along edges and 1 cm at corners, on a grid of 5 cm.
-    """
+    """Distance of points (..., 3) [m] from the nearest block, negative inside it, for numpy and jax.numpy (``xp``);
+    exact to about 3 mm along edges and 1 cm at corners, on a grid of 5 cm. ``distance`` and ``top`` are those of
+    ``block_distances``, flattened."""
     rows, columns = frame.shape
     c = xp.clip((points[..., 0] - frame.x0) / frame.resolution, 0, columns - 1.001)
     r = xp.clip((points[..., 1] - frame.y0) / frame.resolution, 0, rows - 1.001)

@@ -25,11 +25,8 @@ _ON_FLOOR = 0.01
 
 
 def box_mesh(boxes: Boxes) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "f 3"]]:
-    """Twelve triangles a box, normals outward.
-
-    Returns:
-        vertices (8 n, 3) float32 [m] and faces (12 n, 3) int32, both box after box.
-    """
+    """Twelve triangles a box, normals outward: vertices (8 n, 3) float32 [m] and faces (12 n, 3) int32, both box after
+    box."""
     x, y, yaw, length, width, bottom, top = boxes.rows.T[..., None]
     u, v = _CORNERS[:, 0] * length, _CORNERS[:, 1] * width
     c, s = np.cos(yaw), np.sin(yaw)
@@ -50,16 +47,8 @@ def seen_box_mesh(boxes: Boxes, highest: float) -> tuple[Float[np.ndarray, "v 3"
 
 
 def floor_mesh(frame: GridFrame, z: float = 0.0, up: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """A rectangle over the whole grid, cells' outer edges included.
-
-    Args:
-        frame: the grid.
-        z: its height [m].
-        up: whether its normal points up (a floor) or down (a ceiling).
-
-    Returns:
-        vertices (4, 3) float32 [m] and faces (2, 3) int32.
-    """
+    """A rectangle over the whole grid, cells' outer edges included, at a height ``z`` [m]. Its normal points up (a
+    floor) or down (a ceiling)."""
     half = frame.resolution / 2
     x = frame.x0 - half, frame.x0 + frame.shape[1] * frame.resolution - half
     y = frame.y0 - half, frame.y0 + frame.shape[0] * frame.resolution - half
@@ -81,17 +70,7 @@ def join_meshes(*meshes: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.
 def floorplan_mesh(
     plan: FloorPlan, blocks: Blocks | None = None, ceiling: float | None = None
 ) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "f 3"]]:
-    """Walls, furniture, blocks and floor of a plan as one mesh.
-
-    Args:
-        plan: the floor plan.
-        blocks: the clutter on its floor.
-        ceiling: height of the ceiling [m]; none by default.
-
-    Returns:
-        vertices (v, 3) float32 [m] and faces (f, 3) int32: walls and furniture box after box, then the blocks, then
-        the floor, then the ceiling.
-    """
+    """Walls, furniture, blocks, floor and, at a height [m], a ceiling as one mesh, in this order, box after box."""
     boxes = plan.boxes if blocks is None else plan.boxes + blocks.boxes()
     parts = [box_mesh(boxes), floor_mesh(plan.frame)]
     if ceiling is not None:
@@ -102,18 +81,9 @@ def floorplan_mesh(
 def heightfield_mesh(
     heights: Float[np.ndarray, "rows columns"], frame: GridFrame
 ) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "f 3"]]:
-    """A height field as triangles: one vertex in the middle of every cell, normals up, as MuJoCo draws it.
-
-    Args:
-        heights: height of every cell [m].
-        frame: where the cells lie.
-
-    Returns:
-        vertices (rows * columns, 3) float32 [m] and faces (2 (rows - 1) (columns - 1), 3) int32.
-
-    Raises:
-        ValueError: if heights and frame differ in shape, or there are fewer than 2 x 2 cells.
-    """
+    """A height field [m] as triangles: one vertex in the middle of every cell, normals up, as MuJoCo draws it; vertices
+    (rows * columns, 3) float32 [m] and faces (2 (rows - 1) (columns - 1), 3) int32. Raises ``ValueError`` if heights
+    and frame differ in shape, or there are fewer than 2 x 2 cells."""
     rows, columns = frame.shape
     if heights.shape != (rows, columns):
         raise ValueError(f"heights have shape {heights.shape}, the frame {frame.shape}")

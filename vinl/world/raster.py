@@ -13,12 +13,8 @@ from vinl.world.grid import GridFrame
 
 
 def label_regions(mask: Bool[np.ndarray, "rows columns"], corners: bool = False) -> Int[np.ndarray, "rows columns"]:
-    """Number of each cell's connected region, from 1 on in the order of their first cells; 0 off the mask.
-
-    Args:
-        mask: the cells that count.
-        corners: whether cells also join over corners, and not over edges only.
-    """
+    """Number of each cell's connected region, from 1 on in the order of their first cells; 0 off the mask. Cells join
+    over edges, with ``corners`` also over these."""
     regions, _ = label(mask, np.ones((3, 3), bool) if corners else None)  # type: ignore[misc]
     return regions
 
@@ -31,13 +27,11 @@ def find_largest(regions: Int[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "
 
 
 def split_rectangles(mask: Bool[np.ndarray, "rows columns"], limit: int = 20_000) -> Int[np.ndarray, "n 4"]:
-    """Few rectangles that together cover exactly the true cells of the mask.
+    """Few rectangles that together cover exactly the true cells of the mask: first row, first column, one past the last
+    row, one past the last column.
 
-    Greedy: the first cell not yet covered (row by row) grows into the larger of two rectangles, widest first or
-    tallest first. Rectangles may overlap, which saves boxes where walls cross.
-
-    Returns:
-        One rectangle a row: first row, first column, one past the last row, one past the last column.
+    Greedy: the first cell not yet covered (row by row) grows into the larger of two rectangles, widest first or tallest
+    first. Rectangles may overlap, which saves boxes where walls cross.
 
     Raises:
         InputError: if more than ``limit`` rectangles are needed: such a mask is noise, and no simulator takes it.
@@ -132,17 +126,10 @@ POCKET = 2.0
 
 
 def find_inside(walls: Bool[np.ndarray, "rows columns"], resolution: float) -> Bool[np.ndarray, "rows columns"]:
-    """The floor that walls enclose.
+    """The floor that walls enclose: true on it, false on walls and outside. ``resolution`` is the side of a cell [m].
 
     The outside is where a disc as wide as a door can roll to from the edge of the grid without touching a wall: it
     cannot roll through a door. What it cannot cover is inside, except for the corners that are too narrow for it.
-
-    Args:
-        walls: true where a wall stands; the grid's edge is outside.
-        resolution: side of a cell [m].
-
-    Returns:
-        True on enclosed floor, false on walls and outside.
     """
     walls = np.pad(walls, int(GAPS[-1] / resolution) + 2)
     away = np.asarray(distance_transform_edt(~walls)) * resolution

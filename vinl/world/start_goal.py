@@ -23,16 +23,11 @@ _TRIES = 200
 
 @dataclass(frozen=True, eq=False)
 class StartGoal:
-    """Where an episode begins and where it should end.
+    """Where an episode begins, with its heading [rad], and where it should end [m].
 
-    Attributes:
-        start: shape (2,), start of the robot's middle [m].
-        yaw: heading at the start [rad].
-        goal: shape (2,), goal [m].
-        geodesic_m: shortest path over the free floor eroded by the robot's footprint [m].
-        straight_m: straight distance [m].
-        note: why the distance or the clearance is less than was asked for, or that floor was left out or gaps are
-            narrow; empty if all is well.
+    ``geodesic_m`` is the shortest path over the free floor eroded by the robot's footprint [m]; ``note`` says why
+    distance or clearance are less than was asked for, or that floor was left out or gaps are narrow, and is empty if
+    all is well.
     """
 
     start: Float[np.ndarray, " 2"]
@@ -46,22 +41,17 @@ class StartGoal:
 def sample_start_goals(
     plan: FloorPlan, n: int, rng: np.random.Generator, min_distance: float = 5.0, clearance: float = 0.5
 ) -> list[StartGoal]:
-    """Draw pairs of start and goal, both in one region that the robot really fits through.
+    """Draw n pairs of start and goal, both in one region that the robot really fits through. The same state of the
+    generator gives the same pairs.
 
     The region is the largest that is connected for ``FIT_RADIUS``, so that no path leads only through a gap between
-    chairs that the robot would get stuck in. If that region is too small for the distance, but the largest one for
-    the navigator's ``FOOTPRINT_RADIUS`` is not, the latter takes its place.
+    chairs that the robot would get stuck in. If that region is too small for the distance, but the largest one for the
+    navigator's ``FOOTPRINT_RADIUS`` is not, the latter takes its place.
 
-    Pairs are uniform among those that keep the straight distance and the clearance. If no spot of the region has the
-    clearance, 0.4 m (the robot can still turn) takes its place; if no two spots are ``min_distance`` apart, 90 % of
-    the region's largest distance does. The pair's note tells of all this.
-
-    Args:
-        plan: the floor plan.
-        n: how many pairs.
-        rng: the only source of chance: the same generator state gives the same pairs.
-        min_distance: least straight distance [m].
-        clearance: least distance of start and goal to walls, furniture and the outside [m].
+    Pairs are uniform among those whose straight distance is at least ``min_distance`` [m] and that lie at least
+    ``clearance`` [m] from walls, furniture and the outside. If no spot of the region has the clearance, 0.4 m (the
+    robot can still turn) takes its place; if no two spots are ``min_distance`` apart, 90 % of the region's largest
+    distance does. The pair's note tells of all this.
 
     Raises:
         InputError: if the plan has no room for the robot to stand, or a number asked for is not sensible.
@@ -98,32 +88,22 @@ def sample_start_goals(
 
 
 def measure_route(space: FreeSpace, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]) -> StartGoal:
-    """A start and a goal with their distances, heading 0. The shortest one is infinite where no path leads from one to
-    the other.
-
-    Raises:
-        InputError: the goal is not on floor that the robot can reach.
-    """
+    """A start and a goal [m] with their distances, heading 0; the shortest one is infinite where no path leads there.
+    Raises ``InputError`` if the goal is not on floor that the robot can reach."""
     straight = float(np.linalg.norm(goal - start))
     return StartGoal(start, 0.0, goal, max(shortest_distance(space, start, goal), straight), straight)
 
 
 def shortest_distance(space: FreeSpace, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]) -> float:
-    """Length of the shortest path [m]; infinite where there is none.
-
-    Raises:
-        InputError: the goal is not on floor that the robot can reach.
-    """
+    """Length of the shortest path [m]; infinite where there is none. Raises ``InputError`` if the goal is not on floor
+    that the robot can reach."""
     frame = space.plan.frame
     return float(read_field(distance_field(space.traversable, frame, goal), frame, start))
 
 
 def check_way(plan: FloorPlan) -> FloorPlan:
-    """The plan, if the robot has a path of ``LEAST_PATH`` to go in it.
-
-    Raises:
-        InputError: if its free floor is in pieces, none of which is that long.
-    """
+    """The plan, if the robot has a path of ``LEAST_PATH`` to go in it. Raises ``InputError`` if its free floor is in
+    pieces, none of which is that long."""
     space = FreeSpace(plan)
     pieces = int(space.regions.max())
     longest = _measure_extent(plan.frame.xy(np.argwhere(space.regions == space.largest)))

@@ -27,15 +27,9 @@ def draw_hurdles(
 ) -> Blocks:
     """Square rings around the origin, each of four blocks of one height, without a gap at the corners.
 
-    Args:
-        rng: the only source of chance.
-        side: of the tile [m]; no block reaches beyond it.
-        clear: half the side of the square in the middle that stays free [m].
-        height: range of the rings' heights [m].
-        depth: of the rings [m] [paper IV-A: 0.2].
-
-    Returns:
-        The blocks; none if the tile is too small for a ring.
+    None reaches beyond the tile, whose side is given [m], or into the square of half-width ``clear`` in its middle [m],
+    so that a small tile has none. ``height`` is the range of the rings' heights [m], ``depth`` theirs [m] [paper IV-A:
+    0.2].
     """
     tilt = rng.uniform(-_TILT, _TILT)
     rows = []
@@ -68,10 +62,8 @@ def draw_bars(
 
 
 def _places(rng: np.random.Generator, side: float, clear: float, tilt: float, depth: float) -> list[float]:
-    """Distances of the middles of rings or bars from the origin [m], turned by ``tilt`` and kept to the tile.
-
-    ``clear`` is the radius of the circle that stays free [m].
-    """
+    """Distances of the middles of rings or bars from the origin [m], turned by ``tilt`` and kept to the tile, off a
+    circle of radius ``clear`` [m]."""
     farthest = side / 2 / (np.cos(tilt) + np.sin(abs(tilt))) - depth / 2
     at, places = clear + depth / 2 + rng.uniform(0, _PITCH[0]), []
     while at <= farthest:
@@ -98,16 +90,8 @@ _SHORTEST = 0.1
 
 
 def draw_rooms(rng: np.random.Generator, side: float, difficulty: float) -> Boxes:
-    """Walls of a tile around the origin, one metre high.
-
-    Args:
-        rng: random numbers.
-        side: of the tile [m].
-        difficulty: from 0 to 1: how near the walls are to each other.
-
-    Returns:
-        The walls: missing, with a doorway, or closed.
-    """
+    """Walls of a tile of this side [m] around the origin, one metre high: missing, with a doorway, or closed, and the
+    nearer to each other the higher the difficulty, 0 to 1."""
     xs, ys = _stand_walls(rng, side, difficulty), _stand_walls(rng, side, difficulty)
     rows: list[list[float]] = []
     for turned, lines, across in ((False, ys, xs), (True, xs, ys)):
@@ -251,14 +235,10 @@ class TerrainConfig:
 
 @dataclass(frozen=True, eq=False)
 class Terrain:
-    """Tiles on one height field.
+    """Tiles on one height field, whose centre is the world's origin, with the blocks and the tall boxes of all of them.
 
-    Attributes:
-        ground: heights and labels; its centre is the world's origin.
-        starts: (levels, columns, 3) middle of every tile: x, y and the highest ground within 0.8 m [m].
-        kinds: tile type of every column.
-        blocks: the blocks of all tiles.
-        tall: the tall boxes of all tiles.
+    ``starts`` are the middles of the tiles, x, y and the highest ground within 0.8 m [m]; ``kinds`` the tile type of
+    every column.
     """
 
     ground: HeightField
@@ -340,11 +320,7 @@ def draw_tall(rng: np.random.Generator, centres: Float[np.ndarray, "n 2"], long:
 
 
 def build_terrain(config: TerrainConfig) -> Terrain:
-    """Draw all tiles.
-
-    Returns:
-        The terrain: tile [level k, column c] has its middle at ``starts[k, c]``.
-    """
+    """Draw all tiles."""
     border = round(BORDER / RESOLUTION)
     shape = (config.columns * CELLS + 2 * border + 1, config.levels * CELLS + 2 * border + 1)
     frame = GridFrame(-(shape[1] - 1) * RESOLUTION / 2, -(shape[0] - 1) * RESOLUTION / 2, RESOLUTION, shape)

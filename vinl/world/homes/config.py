@@ -100,11 +100,8 @@ _OWN = {
 
 
 def layout_config(layout: str, config: HomeConfig | None = None) -> HomeConfig:
-    """Another layout with the walls, doors and furniture of a configuration, but sizes of its own.
-
-    Raises:
-        InputError: there is no such layout.
-    """
+    """Another layout with the walls, doors and furniture of a configuration, but sizes of its own. Raises
+    ``InputError`` if there is no such layout."""
     own = _OWN.get(layout)
     if own is None:
         raise InputError(f"homes: layout must be one of {', '.join(LAYOUTS)}, got {layout!r}")

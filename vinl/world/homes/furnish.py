@@ -116,13 +116,8 @@ TRIES = 10
 
 @dataclass
 class Piece:
-    """A piece of furniture in its place.
-
-    Attributes:
-        room: number of its room.
-        rows: its boxes.
-        chief: false for what stands with something else: chairs at a table, tables beside a bed.
-    """
+    """Boxes of a piece of furniture in its place in a room; not chief is what stands with something else: chairs at a
+    table, tables beside a bed."""
 
     room: int
     rows: list[Row]

@@ -48,18 +48,8 @@ ROUNDS = 12
 def keep_connected(
     rooms: list[Room], walls: Boxes, pieces: list[Piece], inside: Bool[np.ndarray, "rows columns"], frame: GridFrame
 ) -> list[Piece] | None:
-    """The pieces that may stay, so that a robot of ``FIT_RADIUS`` reaches every room, and all floor but pockets.
-
-    Args:
-        rooms: of the home.
-        walls: lintels included.
-        pieces: all furniture.
-        inside: floor of the home on the frame.
-        frame: of ``CHECKED_AT``.
-
-    Returns:
-        ``None`` if the rooms are not connected even without furniture.
-    """
+    """The pieces that may stay, so that a robot of ``FIT_RADIUS`` reaches every room, and all floor but pockets; None
+    if the rooms are not connected even without furniture. ``inside`` is the floor on a frame of ``CHECKED_AT``."""
     floor = inside & ~paint_boxes(walls.below(BODY_HEIGHT), frame)
     cells = _find_low(pieces, frame)
     windows = [_window(rect, frame) for room in rooms for rect in room.rects]
@@ -152,15 +142,11 @@ IMPOSSIBLE = "homes: no home fits the config; widen its ranges (area, corridor_w
 
 
 def generate_home(seed: int, config: HomeConfig | None = None, resolution: float = RESOLUTION) -> FloorPlan:
-    """Generate a home: rooms, walls, doors, furniture. The same seed gives the same home.
+    """Generate a home: rooms, walls, doors, furniture. The same seed, 0 or more, gives the same home.
 
     Every room can be reached by a robot of radius ``free_space.FIT_RADIUS``; furniture that would prevent it is left
-    away.
-
-    Args:
-        seed: 0 or more.
-        config: what homes are like; ``HomeConfig()`` if left away.
-        resolution: side of the cells of the plan's grids [m], 0.02 to 0.1; walls and furniture do not depend on it.
+    away. Walls and furniture do not depend on ``resolution``, the side of the cells of the plan's grids, 0.02 to 0.1
+    [m].
 
     Raises:
         InputError: if the seed is negative, the resolution out of range, or no home fits the config.
@@ -195,11 +181,7 @@ def generate_home(seed: int, config: HomeConfig | None = None, resolution: float
 
 
 def draw_shell(rng: Random, config: HomeConfig) -> Shell:
-    """Rooms, walls and doors.
-
-    Raises:
-        InputError: if no home fits the config.
-    """
+    """Rooms, walls and doors. Raises ``InputError`` if no home fits the config."""
     for _ in range(ATTEMPTS):
         rooms = draw_office(rng, config) if config.layout == "office" else draw_rooms(rng, config)
         if not config.area[0] <= sum(room.area for room in rooms) <= config.area[1]:
@@ -216,13 +198,7 @@ RESERVED_FROM = 1_000_000_000
 
 @dataclass(frozen=True)
 class JudgingSet:
-    """Floors of one layout from a row of seeds.
-
-    Attributes:
-        layout: one of ``vinl.world.homes.config.LAYOUTS``, as ``layout_config`` has it.
-        first_seed: of the first floor.
-        count: floors.
-    """
+    """So many floors of one of ``LAYOUTS``, as ``layout_config`` has it, from a row of seeds."""
 
     layout: str
     first_seed: int
@@ -239,11 +215,7 @@ JUDGING_SETS = {"offices": JudgingSet("office", 2_000_000_000), "dead_ends": Jud
 
 
 def find_judging_set(name: str) -> JudgingSet:
-    """The set of a name.
-
-    Raises:
-        InputError: there is none.
-    """
+    """The set of a name. Raises ``InputError`` if there is none."""
     if name not in JUDGING_SETS:
         raise InputError(
             f"unknown set of homes {name!r}{closest(name, JUDGING_SETS)}; known: {', '.join(JUDGING_SETS)}"

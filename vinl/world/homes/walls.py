@@ -24,14 +24,11 @@ Row = tuple[float, float, float, float, float, float, float]
 
 @dataclass
 class Edge:
-    """A stretch of line where two rectangles touch, or one and the outside.
+    """A stretch of line where two rectangles touch, or one and the outside: at a coordinate across, from one to another
+    along [m]; upright lines run along y.
 
-    Attributes:
-        upright: whether the line runs along y.
-        at: where the line lies across [m].
-        low, high: where it begins and ends along [m].
-        rooms: number of the room on the side of smaller coordinates, then of larger; -1 is outside.
-        gaps: (low, high, top) of its openings [m].
+    ``rooms`` are the room on the side of smaller coordinates, then of larger, -1 outside; ``gaps`` its openings, from,
+    to, top [m].
     """
 
     upright: bool
@@ -44,17 +41,9 @@ class Edge:
 
 @dataclass
 class Shell:
-    """A home without furniture.
-
-    Attributes:
-        rooms: its rooms.
-        edges: where walls stand; lines within one room have none and are left out.
-        walls: boxes of walls and lintels.
-        panes: boxes of windows and of the front door, drawn only.
-        inner, outer: thickness of the walls [m].
-        height: of the walls [m].
-        clear: per room, rectangles before its doors.
-    """
+    """A home without furniture. Edges are where walls stand (lines within one room have none), walls include lintels,
+    panes are windows and the front door, drawn only; ``inner`` and ``outer`` are thicknesses [m]. ``clear`` has for
+    each room rectangles before its doors."""
 
     rooms: list[Room]
     edges: list[Edge]

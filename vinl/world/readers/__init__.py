@@ -77,11 +77,7 @@ def load_floorplan(
 
 
 def check_file(path: str | Path) -> tuple[Path, int | None]:
-    """The file of a floor plan, and the number of the plan in it.
-
-    Raises:
-        InputError: there is no such file.
-    """
+    """The file of a floor plan, and the number of the plan in it. Raises ``InputError`` if there is no such file."""
     text = str(path)
     if text in shipped_floorplans():
         return assets_dir() / "floorplans" / f"{text}.json", None
@@ -106,11 +102,8 @@ def load_floorplans(
 
 
 def open_floorplans(floorplans: str | Path | FloorPlan | Sequence[str | Path | FloorPlan]) -> list[FloorPlan]:
-    """Floor plans from names, files and plans, or from one of them; all shipped ones from an empty list.
-
-    Raises:
-        InputError: a file is missing or broken, or it is no floor plan at all.
-    """
+    """Floor plans from names, files and plans, or from one of them; all shipped ones from an empty list. Raises
+    ``InputError`` if a file is missing or broken, or it is no floor plan at all."""
     chosen = [floorplans] if isinstance(floorplans, (str, Path, FloorPlan)) else list(floorplans)
     for plan in chosen:
         if not isinstance(plan, (str, Path, FloorPlan)):

@@ -28,18 +28,8 @@ def is_houseexpo(entries: dict[str, Any]) -> bool:
 def build_houseexpo_plan(
     entries: dict[str, Any], name: str, source: str, scale: float | None, wall_height: float
 ) -> FloorPlan:
-    """Build a floor plan from ``verts``, with room names from ``room_category``.
-
-    Args:
-        entries: the plan.
-        name: of the plan, if it has no ``id``.
-        source: file and number, for errors.
-        scale: metres per unit; 1 if ``None``.
-        wall_height: [m].
-
-    Raises:
-        InputError: if the outline is missing, too short, crosses itself or is not in metres.
-    """
+    """Build a floor plan from ``verts``, with room names from ``room_category``; ``scale`` is metres per unit, 1 if
+    None. Raises ``InputError`` if the outline is missing, too short, crosses itself or is not in metres."""
     verts = entries.get("verts")
     if not isinstance(verts, list) or len(verts) < 3:
         found = "none" if not verts else f"{len(verts)} points" if isinstance(verts, list) else "something else"

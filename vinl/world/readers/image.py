@@ -33,13 +33,8 @@ def read_image_plan(file: Path, resolution: float | None, min_speck: int, wall_h
     """Read a bare picture; its lower left corner is the origin.
 
     Where the picture has transparent parts, walls are its opaque pixels; but if most of what is opaque is light, the
-    light is floor, the dark is wall and the transparent is outside. Without transparency, dark is wall.
-
-    Args:
-        file: picture.
-        resolution: metres per pixel; 0.05 if not given.
-        min_speck: pieces of fewer pixels are dropped.
-        wall_height: height of the walls [m].
+    light is floor, the dark is wall and the transparent is outside. Without transparency, dark is wall. Arguments are
+    those of ``load_floorplan``.
 
     Raises:
         InputError: if the picture cannot be read, is empty, or encloses no floor.
@@ -70,11 +65,8 @@ def read_image_plan(file: Path, resolution: float | None, min_speck: int, wall_h
 
 
 def read_pixels(file: Path) -> tuple[UInt8[np.ndarray, "rows columns"], UInt8[np.ndarray, "rows columns"]]:
-    """Grey values (mean of the colours) and opacity of a picture, 0-255, top row first.
-
-    Raises:
-        InputError: if the picture cannot be read.
-    """
+    """Grey values (mean of the colours) and opacity of a picture, 0-255, top row first. Raises ``InputError`` if the
+    picture cannot be read."""
     try:
         with warnings.catch_warnings():  # Pillow warns of, or refuses, what is larger than it likes
             warnings.simplefilter("error", Image.DecompressionBombWarning)
@@ -108,17 +100,8 @@ def build_from_pixels(
     wall_height: float,
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> FloorPlan:
-    """A floor plan from a mask of walls, top row first.
-
-    Args:
-        file: for messages and the name.
-        walls: pixels that are walls.
-        known: pixels that are known to be floor; ``None`` where nothing is unknown.
-        resolution: metres per pixel.
-        min_speck: pieces of wall of fewer pixels are dropped.
-        wall_height: height of the walls [m].
-        origin: x [m], y [m], yaw [rad] of the picture's lower left corner.
-    """
+    """A floor plan from masks, top row first: of walls, and of what is known to be floor (None: nothing is unknown).
+    ``resolution`` is metres per pixel, ``origin`` x [m], y [m] and yaw [rad] of the picture's lower left corner."""
     walls = drop_specks(walls, min_speck)[::-1]
     if not walls.any():
         raise InputError(f"{file}: no wall is left after dropping specks of fewer than {min_speck} pixels")

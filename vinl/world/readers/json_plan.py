@@ -26,16 +26,11 @@ _SMALL = 20_000_000
 def read_json_plan(
     file: Path, index: int | None, resolution: float | None = None, wall_height: float = 2.5
 ) -> FloorPlan:
-    """Read plan number ``index`` (from 0 on; the first if ``None``) of a file.
+    """Read plan number ``index`` (from 0 on; the first if ``None``) of a file; other arguments as of
+    ``load_floorplan``.
 
     What is in it tells the format: our own two by their ``schema``, HouseExpo by ``verts``, vectors by walls of four
     numbers, ProcTHOR otherwise.
-
-    Args:
-        file: what to read.
-        index: of the plan.
-        resolution: metres per pixel of vectors, metres per unit of HouseExpo; ``None`` takes what the format says.
-        wall_height: of vectors and HouseExpo [m].
 
     Raises:
         InputError: if the file is broken, holds no such plan, or the plan has no floor for the robot.
@@ -76,11 +71,7 @@ def read_json_plan(
 
 
 def count_plans(file: Path) -> int:
-    """How many plans a file holds.
-
-    Raises:
-        InputError: if it is broken, or no JSON.
-    """
+    """How many plans a file holds. Raises ``InputError`` if it is broken, or no JSON."""
     if not file.name.lower().removesuffix(".gz").endswith((".json", ".jsonl")):
         raise InputError(f"{file}: only JSON files hold several plans")
     return len(_read_plans(file))
@@ -136,14 +127,9 @@ _SLICE = re.compile(r"^(?P<file>.+?):(?P<first>\d+):(?P<end>\d+)(?::(?P<step>\d+
 
 
 def expand_paths(paths: Sequence[str]) -> list[str]:
-    """The plans that paths name, one by one.
-
-    ``FILE:0-49`` are the first fifty plans of a JSON file, ``FILE:50-`` those from number 50 to the end, ``FILE:0-/2``
-    every second one; ``FILE:1:199:2`` is every second one from 1 to below 199. Other paths stay as they are.
-
-    Raises:
-        InputError: a file is missing, or has no such plans.
-    """
+    """The plans that paths name, one by one. ``FILE:0-49`` are the first fifty plans of a JSON file, ``FILE:50-`` those
+    from number 50 to the end, ``FILE:0-/2`` every second one; ``FILE:1:199:2`` is every second one from 1 to below 199.
+    Other paths stay as they are. Raises ``InputError`` if a file is missing, or has no such plans."""
     return [plan for path in paths for plan in _expand(str(path))]
 
 

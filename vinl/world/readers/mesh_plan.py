@@ -44,14 +44,8 @@ _CHUNK = 2_000_000
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """What stands on each cell of a grid.
-
-    Attributes:
-        frame: where the cells lie.
-        layers: (layers, rows, columns), whether there is surface in each layer of ``SLICE`` above ``STEP``.
-        floor: (rows, columns) cells with floor.
-        wall_height: top of the walls [m].
-    """
+    """What stands on each cell of a grid: whether there is surface in each layer of ``SLICE`` above ``STEP``, whether
+    there is floor; and how high walls are [m]."""
 
     frame: GridFrame
     layers: Bool[np.ndarray, "layers rows columns"]
@@ -118,13 +112,8 @@ class Columns:
 
 
 def find_columns(triangles: Float[np.ndarray, "f 3 3"], frame: GridFrame, wall_height: float) -> Columns:
-    """Sort the surface of triangles, sampled every half cell, into cells and layers.
-
-    Args:
-        triangles: with the floor at z = 0 [m].
-        frame: of the grid.
-        wall_height: surface above it is left out [m].
-    """
+    """Sort the surface of triangles [m], whose floor is at z = 0, into cells and layers, sampled every half cell. What
+    is above ``wall_height`` [m] is left out."""
     count = max(_layer(wall_height), _layer(WALL_FROM))
     layers = np.zeros((count, *frame.shape), bool)
     floor = np.zeros(frame.shape, bool)
@@ -203,17 +192,11 @@ SHELL = 4.0
 
 
 def read_mesh_plan(file: Path, up: str | None, scale: float | None, wall_height: float) -> FloorPlan:
-    """Read a floor plan from a mesh of one storey, or of the lowest of several.
+    """Read a floor plan from a mesh of one storey, or of the lowest of several; arguments are those of
+    ``load_floorplan``. Without ``scale`` what cannot be in metres is refused.
 
     The floor is found by its level surface. What rises between ``mesh_plan.STEP`` and 0.6 m above it stands in the
     robot's way; what goes on up to 1.7 m is a wall, the rest furniture.
-
-    Args:
-        file: the mesh; all objects of a scene count.
-        up: x, y, z, -x, -y or -z; ``None`` takes y for glTF, as that format says, and for the others y or z,
-            whichever the mesh is shorter along: homes are wider than high.
-        scale: metres per unit; ``None`` takes 1 and refuses what cannot be in metres.
-        wall_height: what is higher above the floor is left out: ceilings, upper storeys [m].
 
     Raises:
         InputError: if the file is broken or holds no triangles, has no floor, is not in metres, or there is no room

@@ -24,11 +24,8 @@ BOXES_SCHEMA = "vinl/floorplan-boxes/1"
 
 
 def build_own_plan(entries: dict[str, Any], name: str, source: str) -> FloorPlan:
-    """Build a floor plan from ``rooms``, ``walls``, ``doors``, ``windows`` and ``furniture``.
-
-    Raises:
-        InputError: if there is no room, a number is not finite, or there is no floor for the robot.
-    """
+    """Build a floor plan from ``rooms``, ``walls``, ``doors``, ``windows`` and ``furniture``. Raises ``InputError`` if
+    there is no room, a number is not finite, or there is no floor for the robot."""
     height = float(entries.get("height", 2.6))
     walls = [Wall(_point(w["from"]), _point(w["to"]), float(w["thickness"]), height) for w in entries["walls"]]
     openings = [Opening(_point(d["from"]), _point(d["to"]), float(d["height"])) for d in entries.get("doors", [])]
@@ -71,11 +68,8 @@ def _read_thing(thing: dict[str, Any]) -> list[float]:
 
 
 def build_boxes_plan(entries: dict[str, Any], name: str, source: str) -> FloorPlan:
-    """Build a floor plan from what ``write_floorplan`` wrote.
-
-    Raises:
-        InputError: if a box or the grid makes no sense, or there is no floor for the robot.
-    """
+    """Build a floor plan from what ``write_floorplan`` wrote. Raises ``InputError`` if a box or the grid makes no
+    sense, or there is no floor for the robot."""
     grid = entries["grid"]
     frame = GridFrame(
         float(grid["x0"]), float(grid["y0"]), float(grid["resolution"]), (int(grid["rows"]), int(grid["columns"]))
@@ -105,15 +99,9 @@ def _read_boxes(rows: list[Any]) -> Boxes:
 
 
 def write_floorplan(plan: FloorPlan, file: str | Path) -> Path:
-    """Write any floor plan as JSON (schema ``vinl/floorplan-boxes/1``, described in docs/floorplans.md).
-
-    Args:
-        plan: the floor plan.
-        file: where to; must end in ``.json``. Folders are made as needed.
-
-    Raises:
-        InputError: if the name has another ending or the file cannot be written.
-    """
+    """Write any floor plan as JSON (schema ``vinl/floorplan-boxes/1``, described in docs/floorplans.md) to a name that
+    ends in ``.json``; folders are made as needed. Raises ``InputError`` if the name has another ending or the file
+    cannot be written."""
     file = Path(file)
     if file.suffix.lower() != ".json":
         raise InputError(f"{file}: give a name that ends in .json")

@@ -139,11 +139,8 @@ def place_label(polygon: Float[np.ndarray, "k 2"]) -> tuple[float, float]:
 def paint_inside(
     polygons: Sequence[Float[np.ndarray, "_ 2"]], walls: Iterable[Wall], source: str
 ) -> tuple[GridFrame, Bool[np.ndarray, "rows columns"]]:
-    """The grid around rooms and walls, and which of its cells lie in a room.
-
-    Raises:
-        InputError: a coordinate is not finite.
-    """
+    """The grid around rooms and walls, and which of its cells lie in a room. Raises ``InputError`` if a coordinate is
+    not finite."""
     every = np.concatenate([*polygons, *[np.array([w.start, w.end]) for w in walls]])
     if not np.isfinite(every).all():
         raise InputError(f"{source}: a wall or a room has a coordinate that is not a number")

@@ -39,17 +39,11 @@ def is_vector_plan(entries: dict[str, Any]) -> bool:
 def build_vector_plan(
     entries: dict[str, Any], name: str, source: str, metres_per_pixel: float | None, wall_height: float
 ) -> FloorPlan:
-    """Build a floor plan from ``walls``, ``doors``, ``icons`` and ``rooms`` in pixels, y down.
+    """Build a floor plan from ``walls``, ``doors``, ``icons`` and ``rooms`` in pixels, y down; ``metres_per_pixel``
+    goes before the file's own ``m_per_px_est``.
 
-    A door with the outside on one side is a window or the front door and stays closed. Of a sheet with several
-    storeys, which are parts that do not touch, the one with the most floor is kept.
-
-    Args:
-        entries: the plan.
-        name: of the plan.
-        source: file and number, for errors.
-        metres_per_pixel: in place of the file's own ``m_per_px_est``.
-        wall_height: [m].
+    A door with the outside on one side is a window or the front door and stays closed. Of a sheet with several storeys,
+    which are parts that do not touch, the one with the most floor is kept.
 
     Raises:
         InputError: if the scale is missing or out of reason, or there is no floor for the robot.
