@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,13 +18,6 @@ from vinl.world.readers import load_floorplan
 from vinl.world.start_goal import StartGoal, sample_start_goals
 
 _DPI = 90
-
-
-def embed_image(picture: Image.Image) -> str:
-    """The picture inside a piece of HTML."""
-    file = io.BytesIO()
-    picture.save(file, format="png")
-    return f'<img src="data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}">'
 
 
 def open_plan(plan: str | Path | FloorPlan) -> FloorPlan:

@@ -26,8 +26,9 @@ from vinl.chain.workers import one_thread, show_line
 from vinl.config.errors import InputError
 from vinl.config.loader import closest
 from vinl.config.output import check_out
-from vinl.notebook.plans import draw_plan, embed_image, open_plan
+from vinl.notebook.plans import draw_plan, open_plan
 from vinl.policies.policy import Policy
+from vinl.render.drawing import encode_picture
 from vinl.render.panels import colour_depth
 from vinl.render.video import POSE_DT, FilmJob, film
 from vinl.robot.aliengo import CONTROL_DT
@@ -75,7 +76,7 @@ class Walk:
 
     def _repr_html_(self) -> str:
         """What happened, over the path from above."""
-        return f"<p>{html.escape(repr(self))}</p>{embed_image(self.draw())}"
+        return f'<p>{html.escape(repr(self))}</p><img src="{encode_picture(self.draw())}">'
 
     @property
     def record(self) -> EpisodeRecord:

@@ -61,9 +61,13 @@ def mark_contacts(trace: EpisodeTrace) -> list[tuple[str, str, str]]:
 def draw_floor(inside: Bool[np.ndarray, "rows columns"]) -> str:
     """The inside of the building as a small picture with a transparent outside, as a data address."""
     alpha = (inside[::-1] * 255).astype(np.uint8)
-    grey = np.full_like(alpha, 128)
+    return encode_picture(Image.fromarray(np.stack([np.full_like(alpha, 128), (alpha * 0.13).astype(np.uint8)], -1)))
+
+
+def encode_picture(picture: Image.Image) -> str:
+    """A picture as a data address."""
     file = io.BytesIO()
-    Image.fromarray(np.stack([grey, (alpha * 0.13).astype(np.uint8)], -1), "LA").save(file, "PNG", optimize=True)
+    picture.save(file, "PNG", optimize=True)
     return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -40,15 +41,13 @@ def look_at(eye: Sequence[float] | np.ndarray, target: Sequence[float] | np.ndar
 
 
 class RayRenderer:
-    """Pictures of a world that does not move and of a robot that does, of which there may be none.
-
-    ``names`` is the order in which ``render`` gets the frames of the bodies; the order of first use by default.
-    """
+    """Pictures of a world that does not move and of a robot that does, of which there may be none. ``names`` is the
+    order in which ``render`` gets the frames of the bodies; the order of first use by default."""
 
     def __init__(self, scene: Scene, bodies: Sequence[BodyMesh] = (), names: Sequence[str] | None = None) -> None:
         self.names = tuple(dict.fromkeys(body.body for body in bodies)) if names is None else tuple(names)
         self._world = build_mesh(scene.vertices, scene.faces, "cpu")
-        self._colours = wp.array(scene.colours, dtype=wp.vec3, device="cpu")
+        self._colours = _array(scene.colours, wp.vec3)
         edge = np.array([[-0.5, -0.5], np.array(scene.floor.shape[::-1]) - 0.5]) * scene.floor.resolution
         low, high = edge + np.array([scene.floor.x0, scene.floor.y0])
         self._floor = [wp.vec2(*low), wp.vec2(*high), wp.vec3(*scene.floor_colour), scene.checker]
@@ -60,13 +59,13 @@ class RayRenderer:
         self._frame_of = np.array([self.names.index(body.body) for body in bodies], dtype=np.int64)
         self._centres, self._radii = np.array(centres).reshape(-1, 3), np.array(radii)
         self._body_inputs = [
-            wp.array([mesh.id for mesh in self._meshes], dtype=wp.uint64, device="cpu"),
-            wp.array(self._frame_of, dtype=int, device="cpu"),
-            wp.array(np.array([body.colour for body in bodies]).reshape(-1, 3), dtype=wp.vec3, device="cpu"),
-            wp.array(self._centres, dtype=wp.vec3, device="cpu"),
-            wp.array(self._radii, dtype=float, device="cpu"),
-            wp.array(first, dtype=int, device="cpu"),
-            wp.array(np.concatenate(normals), dtype=wp.vec3, device="cpu"),
+            _array([mesh.id for mesh in self._meshes], wp.uint64),
+            _array(self._frame_of, int),
+            _array(np.array([body.colour for body in bodies]).reshape(-1, 3), wp.vec3),
+            _array(self._centres, wp.vec3),
+            _array(self._radii, float),
+            _array(first, int),
+            _array(np.concatenate(normals), wp.vec3),
         ]
 
     def render(
@@ -106,8 +105,8 @@ class RayRenderer:
                 self._colours,
                 *self._floor,
                 *body_inputs,
-                wp.array(np.ascontiguousarray(positions, np.float32), dtype=wp.vec3, device="cpu"),
-                wp.array(np.ascontiguousarray(rotations, np.float32), dtype=wp.mat33, device="cpu"),
+                _array(np.ascontiguousarray(positions, np.float32), wp.vec3),
+                _array(np.ascontiguousarray(rotations, np.float32), wp.mat33),
                 wp.vec3(*centre),
                 radius,
                 wp.vec3(*view.position),
@@ -126,20 +125,9 @@ class RayRenderer:
     def sees(self, eye: np.ndarray, target: np.ndarray) -> bool:
         """Whether nothing of the world lies between two points [m]."""
         way = np.asarray(target, np.float64) - np.asarray(eye, np.float64)
-        query = wp.empty(1, dtype=float, device="cpu")
-        wp.launch(
-            cast_rays,
-            dim=1,
-            inputs=[
-                wp.array([self._world.id], dtype=wp.uint64, device="cpu"),
-                wp.zeros(1, dtype=int, device="cpu"),
-                wp.array([eye], dtype=wp.vec3, device="cpu"),
-                wp.array([way], dtype=wp.vec3, device="cpu"),
-                1.0,
-            ],
-            outputs=[query],
-            device="cpu",
-        )
+        worlds, numbers, query = _array([self._world.id], wp.uint64), _array([0], int), _array([0.0], float)
+        rays = _array([eye], wp.vec3), _array([way], wp.vec3)
+        wp.launch(cast_rays, 1, [worlds, numbers, *rays, 1.0], [query], device="cpu")
         return bool(query.numpy()[0] >= 1.0)
 
     def _enclose(self, positions: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, float]:
@@ -148,6 +136,10 @@ class RayRenderer:
         centres = positions[frames] + np.einsum("nij,nj->ni", rotations[frames], self._centres)
         middle = (centres.min(0) + centres.max(0)) / 2
         return middle, float((np.linalg.norm(centres - middle, axis=1) + self._radii).max())
+
+
+def _array(values: Any, kind: Any) -> wp.array:
+    return wp.array(values, dtype=kind, device="cpu")
 
 
 def _corner_normals(vertices: np.ndarray, faces: np.ndarray) -> Float[np.ndarray, "c 3"]:

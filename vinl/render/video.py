@@ -95,7 +95,7 @@ def draw_frames(job: FilmJob, config: EvaluationConfig) -> Iterator[UInt8[np.nda
             f"{time:5.1f} s" + (f"   ({pace} x)" if pace > 1 else ""),
             f"command {trace.commands[chosen[k], 0]:.2f} m/s, {trace.commands[chosen[k], 2]:+.2f} rad/s",
             f"speed {speed[k]:.2f} m/s",
-            f"contact steps: foot {_count_steps(seen, (0, 1))}, leg {_count_steps(seen, (2, 3))}",
+            f"contact steps: foot {count_steps(seen, (0, 1))}, leg {count_steps(seen, (2, 3))}",
             "" if k < len(poses) - 1 else record.end_reason,
         ]
         path = trace.poses[: chosen[k] + 1 : 2, :2]
@@ -122,8 +122,8 @@ def _speeds(poses: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     return np.convolve(np.pad(ahead, 2, mode="edge"), np.full(5, 0.2), mode="valid")
 
 
-def _count_steps(contacts: np.ndarray, kinds: tuple[int, ...]) -> int:
-    """Control steps with a contact of one of the kinds."""
+def count_steps(contacts: np.ndarray, kinds: tuple[int, ...]) -> int:
+    """Control steps with a contact of one of the kinds, which are numbers in ``KINDS``."""
     return len(np.unique(contacts[np.isin(contacts[:, 1], kinds), 0]))
 
 

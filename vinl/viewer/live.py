@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from vinl.chain.choose import check_cameras, choose_locomotor, load_navigator
+from vinl.chain.choose import check_cameras, choose_locomotor, choose_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.controller import open_controller
 from vinl.chain.depth_cameras import CameraErrors, DepthCameras, RealCameras, open_depth_cameras
 from vinl.chain.navigators.base import Navigator, Task, decide
 from vinl.chain.navigators.learned import DeadReckoning
-from vinl.chain.robot import KINDS, FaultyState, Robot, build_model
+from vinl.chain.robot import FaultyState, Robot, build_model
 from vinl.chain.scene import FORCE_SENSORS
 from vinl.config.errors import InputError
 from vinl.policies.policy import Policy
 from vinl.robot.aliengo import CONTROL_DT, FOOT_GEOMS
-from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
+from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
 from vinl.robot.rotation import yaw_of
 from vinl.viewer.session import (
     ChangePolicies,
@@ -50,7 +50,6 @@ SNAP = 0.5
 """A goal off the free floor is moved to the nearest place where the robot fits, at most this far [m]."""
 
 _PATH_EVERY = 5
-_LIMBS = ("foot", "leg", "trunk")
 
 
 def look_through(
@@ -80,7 +79,7 @@ class LiveChain:
         self._seed = seed % 2**31
         self._errors = None if config.sensors.is_ideal else CameraErrors(config.sensors, [self._seed])
         self._locomotion = choose_locomotor(locomotion)
-        self._navigator = self._load_navigator(navigation)
+        self._navigator = choose_navigator(navigation, config)
         check_cameras(self._locomotion, self._navigator)
         self._enter(world)
 
@@ -144,8 +143,7 @@ class LiveChain:
     def snapshot(self, look: bool) -> Snapshot:
         """The present moment. ``look``: render depth images anew."""
         if look or not self._images:
-            qpos = self._walker.qpos[None]
-            self._images = look_through(self._cameras, qpos)
+            self._images = look_through(self._cameras, self._walker.qpos[None])
         data = self._walker.data
         return Snapshot(
             world=self.world,
@@ -193,9 +191,8 @@ class LiveChain:
         self._contacts.extend((time, touch.kind, touch.x, touch.y, touch.z) for touch in touches)
         while self._contacts and self._contacts[0][0] < time - CONTACT_MEMORY:
             self._contacts.popleft()
-        limbs = {KINDS[touch.kind].split("_")[0] for touch in touches}
-        for k, limb in enumerate(_LIMBS):
-            self._limb_steps[k] += limb in limbs
+        for limb in {touch.kind // 2 for touch in touches}:  # see KINDS
+            self._limb_steps[limb] += 1
 
     def _put_down(self, pose: Float[np.ndarray, "3"]) -> None:
         """Let the robot stand somewhere, all memory gone; a goal stays."""
@@ -275,10 +272,12 @@ class LiveChain:
         model = build_model(world.plan.boxes, world.blocks.boxes(), self._locomotion.card, faults)
         self._walker = Robot(model, faults.delay_steps)
         self._controller = open_controller(self._locomotion, world.plan, blocks, ceiling, self._errors)
-        ideal = {
-            name: open_depth_cameras(world.plan, blocks, camera, ceiling)
-            for name, camera in self._choose_cameras().items()
+        # where a policy has no camera, the robot's own, to look through
+        cameras = {
+            "locomotion": self._locomotion.camera or LOCOMOTION_CAMERA,
+            "navigation": self._navigator.camera or NAVIGATION_CAMERA,
         }
+        ideal = {name: open_depth_cameras(world.plan, blocks, camera, ceiling) for name, camera in cameras.items()}
         # what the page shows and what the navigator sees have errors of their own: looking on changes no walk
         self._cameras: Mapping[str, DepthCameras | RealCameras] = ideal
         self._ahead: DepthCameras | RealCameras = ideal["navigation"]
@@ -300,23 +299,11 @@ class LiveChain:
 
     # ---- the policies ----------------------------------------------------------------------------------------------
 
-    def _load_navigator(self, navigation: str | Path | Navigator) -> Navigator:
-        if isinstance(navigation, (str, Path)):
-            return load_navigator(navigation, self._config)
-        return navigation
-
-    def _choose_cameras(self) -> dict[str, Camera]:
-        """The cameras of the policies; where one has none, the robot's own, to look through."""
-        return {
-            "locomotion": self._locomotion.camera or LOCOMOTION_CAMERA,
-            "navigation": self._navigator.camera or NAVIGATION_CAMERA,
-        }
-
     def _change_policies(
         self, locomotion: str | Path | Policy | None, navigation: str | Path | Navigator | None
     ) -> None:
         legs = self._locomotion if locomotion is None else choose_locomotor(locomotion)
-        guide = self._navigator if navigation is None else self._load_navigator(navigation)
+        guide = self._navigator if navigation is None else choose_navigator(navigation, self._config)
         check_cameras(legs, guide)
         goal, self._goal = self._goal, None
         self._locomotion, self._navigator = legs, guide
@@ -329,9 +316,7 @@ class LiveChain:
         """What the policies tell of their footholds, in the world frame; before the robot moves on."""
         tell = getattr(self._locomotion, "footholds", dict[str, np.ndarray])  # policies may have such a method
         found = self._controller.footholds() | tell()
-        places = {name: self._in_world(points[0]) for name, points in found.items()}
-        return Footholds(places.get("planned"), places.get("predicted"))
-
-    def _in_world(self, points: Float[np.ndarray, "4 3"]) -> Float[np.ndarray, "4 3"]:
         c, s = np.cos(self._yaw), np.sin(self._yaw)
-        return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + self._walker.qpos[:3]
+        turn, at = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), self._walker.qpos[:3]
+        places = {name: points[0] @ turn + at for name, points in found.items()}
+        return Footholds(places.get("planned"), places.get("predicted"))

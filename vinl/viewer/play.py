@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vinl.benchmark.journal import Recordings
-from vinl.chain.choose import best_locomotor
+from vinl.chain.choose import best_locomotor, best_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.navigators.base import ORACLE, Navigator
 from vinl.config.errors import InputError
@@ -23,8 +23,6 @@ from vinl.world.readers import load_floorplan, shipped_floorplans
 
 if TYPE_CHECKING:
     from vinl.viewer.viewer import Viewer
-
-_NAVIGATION = "nav"
 
 
 def require_viser(what: str) -> None:
@@ -79,7 +77,7 @@ def play(
     if terrain is not None:
         world, plans = open_ground(terrain, seed, density), []
     else:
-        chosen = plan if plan is not None else _first(shipped)
+        chosen = plan if plan is not None else shipped[0]
         home = chosen if isinstance(chosen, FloorPlan) else load_floorplan(chosen)
         world = open_home(home, obstacles, seed, rules)
         first = home.name if home.name in shipped else str(chosen)
@@ -87,26 +85,19 @@ def play(
         if isinstance(plan, FloorPlan):
             plans = []  # a plan without a file cannot be opened again by its name
     legs = best_locomotor() if locomotion is None else locomotion
-    known = _names_of_kind("navigation")
     guide = navigation
     if guide is None:
-        guide = _NAVIGATION if terrain is None and _NAVIGATION in known else ORACLE
+        guide = best_navigator() if terrain is None else ORACLE
     session = Session(LiveChain(world, legs, guide, rules, seed), pace)
     viewer = Viewer(session, f"vinl play: {world.plan.name}", host, port)
     viewer.add_controls(
         plans,
         _choices(legs, _names_of_kind("locomotion")),
-        _choices(guide, [*known, ORACLE]),
+        _choices(guide, [*_names_of_kind("navigation"), ORACLE]),
         "none" if terrain is not None else obstacles,
     )
     session.start()
     return viewer.start()
-
-
-def _first(names: list[str]) -> str:
-    if not names:
-        raise InputError("no floor plan is shipped with this version; give a file")
-    return names[0]
 
 
 def _names_of_kind(kind: str) -> list[str]:

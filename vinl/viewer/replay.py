@@ -8,9 +8,8 @@ from jaxtyping import Float
 
 from vinl.benchmark.journal import Recordings
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
-from vinl.chain.robot import KINDS
 from vinl.config.errors import InputError
-from vinl.render.video import POSE_DT
+from vinl.render.video import POSE_DT, count_steps
 from vinl.robot.aliengo import FOOT_GEOMS
 from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA
 from vinl.robot.model import robot_spec
@@ -24,7 +23,6 @@ _CONTACT_HEIGHT = 0.06
 """Recordings keep where contacts were from above only; they are drawn at this height [m]."""
 
 _PATH_EVERY = 2
-_LIMBS = ("foot", "leg", "trunk")
 
 
 class Replay:
@@ -81,7 +79,7 @@ class Replay:
             path=self._poses[: k + 1 : _PATH_EVERY, :2],
             distance_m=float(self._walked[k]),
             contacts=np.column_stack([latest, np.full(len(latest), _CONTACT_HEIGHT)]),
-            contact_steps=_count_limbs(seen),
+            contact_steps=(count_steps(seen, (0, 1)), count_steps(seen, (2, 3)), count_steps(seen, (4, 5))),
             feet=self._data.geom_xpos[self._feet].copy(),
             foot_forces=np.zeros(4),
             images=self._images,
@@ -113,10 +111,3 @@ class Replay:
         step, span = self._poses[b, :2] - self._poses[a, :2], (b - a) * POSE_DT
         c, s = np.cos(yaw[0]), np.sin(yaw[0])
         return np.array([c * step[0] + s * step[1], -s * step[0] + c * step[1], wrap_angle(yaw[1] - yaw[0])]) / span
-
-
-def _count_limbs(contacts: Float[np.ndarray, "m 4"]) -> tuple[int, int, int]:
-    """Control steps with a contact of a foot, of a leg, of the trunk."""
-    limb = np.array([_LIMBS.index(kind.split("_")[0]) for kind in KINDS])[contacts[:, 1].astype(int)]
-    foot, leg, trunk = (len(np.unique(contacts[limb == k, 0])) for k in range(3))
-    return foot, leg, trunk

@@ -13,7 +13,7 @@ from vinl.chain.robot import KINDS
 from vinl.render.scene import BLOCK, FLOOR, RobotShape, plan_scene
 from vinl.robot.cameras import Camera
 from vinl.robot.rotation import yaw_of
-from vinl.viewer.session import Footholds, Snapshot
+from vinl.viewer.session import Snapshot
 from vinl.viewer.world import World
 from vinl.world.floorplan import FloorPlan
 from vinl.world.mesh import box_mesh
@@ -96,6 +96,7 @@ class SceneView:
         self._plan: FloorPlan | None = None
         self._world: World | None = None
         self._centre: np.ndarray | None = None
+        self._bounds = np.array([[-5.0, -5.0], [5.0, 5.0]])  # of the plan, once there is one
         self.follows = True
         self._frames = {name: scene.add_frame(f"/vinl/robot/{name}", show_axes=False) for name in self._shape.names}
         for k, body in enumerate(self._shape.bodies):
@@ -125,7 +126,7 @@ class SceneView:
             "/vinl/forces", _NOWHERE, _FORCE, shaft_radius=0.008, head_radius=0.018, head_length=0.03
         )
         self._frustums: dict[str, Any] = {}
-        self._shown = {name: name not in ("cameras",) for name in LAYERS}
+        self._shown = {name: name != "cameras" for name in LAYERS}
         self._path_length = -1
         self._contact_count = (-1, -1.0)
 
@@ -136,11 +137,15 @@ class SceneView:
         if snapshot.world is not self._world:
             self._draw_world(snapshot.world)
         self._move_robot(snapshot.qpos)
-        self._draw_goal(snapshot.goal)
+        self._goal.visible = snapshot.goal is not None
+        if snapshot.goal is not None:
+            self._goal.position = (*snapshot.goal, 0.006)
         self._draw_path(snapshot.path)
         self._draw_contacts(snapshot.contacts)
         self._draw_forces(snapshot.feet, snapshot.foot_forces)
-        self._draw_footholds(snapshot.footholds)
+        for name in ("planned", "predicted"):
+            points = getattr(snapshot.footholds, name)
+            self._draw_points(name, np.zeros((0, 3)) if points is None else points)
         self._draw_command(snapshot.qpos, snapshot.command)
 
     def draw_images(self, images: dict[str, tuple[Camera, UInt8[np.ndarray, "h w 3"]]]) -> None:
@@ -178,19 +183,13 @@ class SceneView:
     @property
     def extent(self) -> float:
         """The longer side of the building [m]."""
-        if self._plan is None:
-            return 10.0
-        cells = np.argwhere(self._plan.inside)
-        return float((cells.max(0) - cells.min(0)).max() * self._plan.frame.resolution)
+        return float(np.ptp(self._bounds, axis=0).max())
 
     def centre_plan(self) -> None:
         """Stop following, the middle of the building in the middle."""
-        self.follows = False
-        if self._plan is not None:
-            cells = np.argwhere(self._plan.inside)
-            middle = self._plan.frame.xy(np.stack([cells.min(0), cells.max(0)])).mean(0)
-            self._centre = middle
-            self._root.position = (-middle[0], -middle[1], 0.0)
+        middle = self._bounds.mean(0)
+        self.follows, self._centre = False, middle
+        self._root.position = (-middle[0], -middle[1], 0.0)
 
     # ---- what is drawn ---------------------------------------------------------------------------------------------
 
@@ -234,7 +233,9 @@ class SceneView:
                         flat_shading=True,
                     )
                 )
+        cells = np.argwhere(plan.inside)
         self._plan, self._centre = plan, None
+        self._bounds = plan.frame.xy(np.stack([cells.min(0), cells.max(0)]))
 
     def _move_robot(self, qpos: Float[np.ndarray, "19"]) -> None:
         positions, rotations = self._shape.place(qpos)
@@ -242,17 +243,11 @@ class SceneView:
             frame = self._frames[name]
             frame.position, frame.wxyz = position, _quaternion(rotation)
         if self.follows:
-            at = qpos[:2]
-            before = self._centre
+            at, before = qpos[:2], self._centre
             if before is None or np.linalg.norm(at - before) > 1.0:
                 before = at.copy()
             self._centre = before + _FOLLOW * (at - before)
             self._root.position = (-self._centre[0], -self._centre[1], 0.0)
-
-    def _draw_goal(self, goal: Float[np.ndarray, "2"] | None) -> None:
-        self._goal.visible = goal is not None
-        if goal is not None:
-            self._goal.position = (goal[0], goal[1], 0.006)
 
     def _draw_path(self, path: Float[np.ndarray, "k 2"]) -> None:
         if len(path) // 2 == self._path_length:
@@ -278,10 +273,6 @@ class SceneView:
         base = feet[loaded] + [0.0, 0.0, 0.04]
         tip = base + np.stack([0 * forces, 0 * forces, 0.05 + _FORCE_SCALE * forces], 1)[loaded]
         self._drawn["forces"].points = np.stack([base, tip], 1).astype(np.float32)
-
-    def _draw_footholds(self, footholds: Footholds) -> None:
-        for name, points in (("planned", footholds.planned), ("predicted", footholds.predicted)):
-            self._draw_points(name, np.zeros((0, 3)) if points is None else points)
 
     def _draw_points(self, name: str, points: Float[np.ndarray, "n 3"]) -> None:
         """A cloud of points; without any, one far below the floor: browsers refuse empty clouds."""

@@ -23,8 +23,15 @@ from vinl.robot.cameras import Camera
 from vinl.viewer.world import World
 
 
+@dataclass(frozen=True)
 class Request:
     """Something that a session is asked for."""
+
+
+@dataclass(frozen=True)
+class _AtPlace(Request):
+    x: float
+    y: float
 
 
 @dataclass(frozen=True)
@@ -34,7 +41,6 @@ class Pause(Request):
     paused: bool
 
 
-@dataclass(frozen=True)
 class StepOnce(Request):
     """One step of the source (20 ms when live), then pause."""
 
@@ -46,17 +52,12 @@ class SetPace(Request):
     pace: float
 
 
-@dataclass(frozen=True)
 class Reset(Request):
     """Put the robot back to where it was last put down."""
 
 
-@dataclass(frozen=True)
-class SetGoal(Request):
+class SetGoal(_AtPlace):
     """Walk to a point [m] with the navigator."""
-
-    x: float
-    y: float
 
 
 @dataclass(frozen=True)
@@ -75,20 +76,12 @@ class Push(Request):
     angle: float
 
 
-@dataclass(frozen=True)
-class PlaceRobot(Request):
+class PlaceRobot(_AtPlace):
     """Put the robot down at x, y [m], with its heading."""
 
-    x: float
-    y: float
 
-
-@dataclass(frozen=True)
-class ToggleBlock(Request):
+class ToggleBlock(_AtPlace):
     """Take away the block at a point [m]; where there is none, put one down."""
-
-    x: float
-    y: float
 
 
 @dataclass(frozen=True)
@@ -129,7 +122,7 @@ class OpenEpisode(Request):
 
 @dataclass(frozen=True, eq=False)
 class DepthImage:
-    """What a depth camera sees: (height, width) [m], and the camera."""
+    """What a depth camera sees [m], and the camera."""
 
     camera: Camera
     depth: Float[np.ndarray, "height width"]
@@ -210,11 +203,7 @@ _IDLE = 0.05
 
 @runtime_checkable
 class Source(Protocol):
-    """What a session steps: a live robot, or a recording.
-
-    Attributes:
-        dt: time of a step [s].
-    """
+    """What a session steps, ``dt`` seconds at a time: a live robot, or a recording."""
 
     dt: float
 

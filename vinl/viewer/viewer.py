@@ -55,7 +55,8 @@ def list_figures(snapshot: Snapshot) -> list[tuple[str, str, str]]:
     foot, leg, trunk = snapshot.contact_steps
     speed, turn = snapshot.velocity[0], math.degrees(snapshot.velocity[2])
     x, y = snapshot.qpos[:2]
-    figures = [
+    factor = "paused" if snapshot.paused else f"{snapshot.real_time:.2f}, {snapshot.step_ms:.1f} ms a step"
+    return [
         ("goal", "goal", goal),
         ("time", "time", time),
         ("robot at x, y", "place", f"{x:.2f}, {y:.2f} m"),
@@ -64,13 +65,8 @@ def list_figures(snapshot: Snapshot) -> list[tuple[str, str, str]]:
         ("measured", "velocity", f"{speed:.2f} m/s, {turn:+.0f} °/s"),
         ("blocks", "blocks", str(len(snapshot.world.blocks))),
         ("contact steps: foot, leg, trunk", "contacts", f"{foot}, {leg}, {trunk}"),
+        ("real-time factor", "factor", factor),
     ]
-    if snapshot.paused:
-        figures.append(("real-time factor", "factor", "paused"))
-    else:
-        factor = f"{snapshot.real_time:.2f}, {snapshot.step_ms:.1f} ms a step"
-        figures.append(("real-time factor", "factor", factor))
-    return figures
 
 
 def render_status(snapshot: Snapshot) -> str:

@@ -111,13 +111,8 @@ def _fence_in(name: str, frame: GridFrame) -> FloorPlan:
     """A grid without anything but a fence along its rim as a floor plan."""
     low, high = frame.xy(np.zeros(2, int)), frame.xy(np.array(frame.shape) - 1)
     (cx, cy), (sx, sy), t = (low + high) / 2, high - low, frame.resolution
-    rows = [
-        [cx, low[1], 0.0, sx, t, 0.0, _FENCE],
-        [cx, high[1], 0.0, sx, t, 0.0, _FENCE],
-        [low[0], cy, 0.0, t, sy, 0.0, _FENCE],
-        [high[0], cy, 0.0, t, sy, 0.0, _FENCE],
-    ]
+    rows = [[cx, y, 0.0, sx, t, 0.0, _FENCE] for y in (low[1], high[1])]
+    rows += [[x, cy, 0.0, t, sy, 0.0, _FENCE] for x in (low[0], high[0])]
     inside = np.ones(frame.shape, bool)
-    free = np.zeros(frame.shape, bool)
-    free[1:-1, 1:-1] = True
+    free = np.pad(inside[1:-1, 1:-1], 1)
     return FloorPlan(name, name, Boxes(np.array(rows)), Boxes.empty(), inside, free, frame)
