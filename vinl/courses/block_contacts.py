@@ -54,15 +54,9 @@ class BlockContacts(NamedTuple):
 
 
 class Strain(NamedTuple):
-    """What one control step took, robot by robot, over all its physics steps.
-
-    Attributes:
-        work: (n,) mechanical work of the joints, positive and negative alike [J].
-        speed: (n,) the fastest joint, as a fraction of what the data sheet allows.
-        leg_leg: (n,) whether a leg touched another.
-        own_body: (n,) whether the robot touched itself at all.
-        stance: (n, 4) which feet carried, in the order of ``LEGS``.
-    """
+    """What one control step took, robot by robot, over all its physics steps: mechanical work of the joints, positive
+    and negative alike [J]; the fastest joint, as a fraction of what the data sheet allows; whether a leg touched
+    another, and whether the robot touched itself at all; which feet carried, in the order of ``LEGS``."""
 
     work: Float[np.ndarray, " n"]
     speed: Float[np.ndarray, " n"]

@@ -27,11 +27,7 @@ _START_STREAM, _COMMAND_STREAM = 0, 1
 
 @dataclass(frozen=True)
 class CommandRanges(CommandConfig):
-    """Commands of a trial.
-
-    Attributes:
-        hold_step: the time until the next command is rounded to multiples of this [s].
-    """
+    """Commands of a trial; the time until the next one is rounded to multiples of ``hold_step`` [s]."""
 
     hold: tuple[float, float] = (5.0, 10.0)
     min_speed: float = 0.0
@@ -114,36 +110,25 @@ class Course:
     def draw_start(self) -> Start:
         """The next start: the first of the trial, then one after every fall and at the end of the ground."""
         ground, rng = self._ground, self._rng
-        home = ground.homes[self.home]
-        if ground.among:
-            return self._draw_among(home)
-        best, gap = home[:2], -np.inf
-        for _ in range(_TRIES):
-            xy = home[:2] + rng.uniform(-ground.spread, ground.spread, 2)
-            free = np.inf
-            if len(ground.blocks):
-                free = float(np.linalg.norm(ground.blocks.rows[:, :2] - xy, axis=1).min())
-            if free > gap:
-                best, gap = xy, free
-            if gap > START_CLEARANCE:
-                break
-        joints = DEFAULT_POSE + rng.uniform(-0.05, 0.05, 12)
-        return Start(float(best[0]), float(best[1]), float(rng.uniform(-np.pi, np.pi)), joints, float(home[2]))
-
-    def _draw_among(self, home: Float[np.ndarray, "3"]) -> Start:
-        """A start among objects, none of which is under a foot."""
-        ground, rng = self._ground, self._rng
-        pose, best = home_qpos(), -np.inf
+        home, widest = ground.homes[self.home], -np.inf
         x = y = yaw = 0.0
         for _ in range(_TRIES):
-            tried = home[:2] + rng.uniform(-ground.spread, ground.spread, 2), float(rng.uniform(-np.pi, np.pi))
-            pose[:] = home_qpos(*tried[0], yaw=tried[1])
-            gap = float(ground.gap(foot_positions(np, pose[None])[0, :, :2]).min())
-            if gap > best:
-                best, (x, y), yaw = gap, tried[0].tolist(), tried[1]
-            if gap > FOOT_CLEARANCE:
+            xy = home[:2] + rng.uniform(-ground.spread, ground.spread, 2)
+            tried = float(rng.uniform(-np.pi, np.pi)) if ground.among else 0.0
+            gap = self._measure_gap(xy, tried)
+            if gap > widest:
+                widest, (x, y), yaw = gap, xy.tolist(), tried
+            if gap > (FOOT_CLEARANCE if ground.among else START_CLEARANCE):
                 break
-        return Start(x, y, yaw, DEFAULT_POSE + rng.uniform(-0.05, 0.05, 12), float(home[2]))
+        joints = DEFAULT_POSE + rng.uniform(-0.05, 0.05, 12)
+        return Start(x, y, yaw if ground.among else float(rng.uniform(-np.pi, np.pi)), joints, float(home[2]))
+
+    def _measure_gap(self, xy: Float[np.ndarray, "2"], yaw: float) -> float:
+        """From the robot to the nearest block: from its feet among objects, otherwise from its trunk [m]."""
+        ground = self._ground
+        if ground.among:
+            return float(ground.gap(foot_positions(np, home_qpos(*xy, yaw=yaw)[None])[0, :, :2]).min())
+        return float(np.linalg.norm(ground.blocks.rows[:, :2] - xy, axis=1).min(initial=np.inf))
 
 
 def draw_commands(

@@ -70,14 +70,9 @@ def build_corridor(config: BarConfig) -> Ground:
     """Walls, bar and what gait and camera see of them, with the middle of the bar at the origin."""
     begin, end = -config.depth / 2 - APPROACH - SPREAD - _MARGIN, config.end + _MARGIN
     aside = (WIDTH + _WALL_THICKNESS) / 2
-    walls = Boxes(
-        np.array(
-            [
-                [(begin + end) / 2, side * aside, 0.0, end - begin, _WALL_THICKNESS, 0.0, _WALL_HEIGHT]
-                for side in (-1.0, 1.0)
-            ]
-        )
-    )
+    middle, length = (begin + end) / 2, end - begin
+    sides = [[middle, y, 0.0, length, _WALL_THICKNESS, 0.0, _WALL_HEIGHT] for y in (-aside, aside)]
+    walls = Boxes(np.array(sides))
     bar = Blocks(np.array([[0.0, 0.0, np.pi / 2, WIDTH, config.depth, config.height]]))
     first, last = np.floor(begin / _RESOLUTION), np.ceil(end / _RESOLUTION)  # the bar is symmetric on the grid
     rows = 2 * round(2 * WIDTH / _RESOLUTION) + 1

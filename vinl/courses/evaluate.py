@@ -104,10 +104,7 @@ def compare_locomotors(
     Terrains are ``grounds.TERRAINS``, with ``density`` blocks or objects per m2 (None: ``grounds.DENSITY``) and, of
     ``rough``, a level for all robots (None: 1 to 9 by turns); commands are one of ``courses.COMMANDS`` (None:
     ``courses.DEFAULTS``). Results do not depend on the number of workers. ``on_progress`` is called with ``"robot"``,
-    robots done and robots in all.
-
-    Raises:
-        InputError: a number is out of range or a name unknown.
+    robots done and robots in all. Raises ``InputError`` if a number is out of range or a name unknown.
     """
     check_number("--robots", robots, 1, 100_000)
     check_number("--seconds", seconds, CONTROL_DT, 36_000)
@@ -147,9 +144,7 @@ def height_fractions(ground: Ground) -> np.ndarray | None:
     return np.bincount(bin_heights(ground.blocks.rows[:, 5]), minlength=BINS) / len(ground.blocks)
 
 
-@lru_cache(maxsize=2)
-def _ground(config: GroundConfig) -> Ground:
-    return build_ground(config)
+_ground = lru_cache(maxsize=2)(build_ground)
 
 
 def _run_group(context: Context, job: Group) -> list[RobotRecord]:

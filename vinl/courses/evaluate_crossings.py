@@ -27,7 +27,6 @@ from vinl.courses.crossing import (
     cross_bar,
 )
 from vinl.courses.evaluate import Group, TrialResults, cut_groups, run_groups
-from vinl.courses.grounds import Ground
 from vinl.courses.robot_records import aggregate_gait
 from vinl.policies.identity import describe_policy
 from vinl.policies.policy import Policy
@@ -88,10 +87,8 @@ def compare_crossings(
     All policies meet the same starts at every height, as many as there are ``crossings``.
 
     With ``traced`` what pictures of the first ``TRACED`` crossings of every height need is kept. Results do not depend
-    on the number of workers. ``on_progress`` is called with ``"crossing"``, crossings done and crossings in all.
-
-    Raises:
-        InputError: a number is out of range, or a policy observes what there is not.
+    on the number of workers. ``on_progress`` is called with ``"crossing"``, crossings done and crossings in all. Raises
+    ``InputError`` if a number is out of range, or a policy observes what there is not.
     """
     if not 1 <= len(heights) <= MAX_HEIGHTS or len(set(heights)) < len(heights):
         raise InputError(f"--height takes 1 to {MAX_HEIGHTS} different heights [m], got {len(heights)}")
@@ -156,9 +153,7 @@ def aggregate_crossings(records: Sequence[CrossingRecord]) -> dict[str, Any]:
     return round_numbers(figures)
 
 
-@lru_cache(maxsize=4)
-def _corridor(config: BarConfig) -> Ground:
-    return build_corridor(config)
+_corridor = lru_cache(maxsize=4)(build_corridor)
 
 
 def _run_group(context: Context, job: _BarGroup) -> list[tuple[CrossingRecord, CrossingTrace | None]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import mujoco
@@ -17,7 +17,7 @@ from vinl.world.boxes import Blocks, Boxes
 from vinl.world.clutter import draw_litter
 from vinl.world.grid import BLOCK, GridFrame, HeightField, flat_field, raise_boxes
 from vinl.world.mesh import box_mesh, floor_mesh, heightfield_mesh, join_meshes
-from vinl.world.terrain import TILE, Terrain, TerrainConfig, build_terrain, draw_blocks, scatter_centres
+from vinl.world.terrain import TILE, TerrainConfig, build_terrain, draw_blocks, scatter_centres
 
 TERRAINS = ("flat", "rough", "blocks", "litter", "rooms")
 
@@ -79,19 +79,12 @@ class GroundConfig:
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """A compiled world for robots that do not see each other.
+    """A compiled world for robots that do not see each other, with the field that maps and cameras see, its blocks,
+    which starts keep clear of, and walls.
 
-    Attributes:
-        model: the world.
-        field: what maps and cameras see.
-        homes: (h, 3) where robots start: x, y and ground height [m].
-        levels: (h,) level of each home; -1 where there are none.
-        kinds: terrain type of each home.
-        reach: a robot that is farther from home than this along x or y [m] is put back.
-        spread: half-width of the square around home that robots start in [m].
-        blocks: the blocks, which starts keep clear of.
-        walls: what stands on the ground beside blocks.
-        among: robots start among the blocks, no foot on one; otherwise with the whole trunk off them.
+    ``homes`` are where robots start: x, y and ground height [m], each with its terrain type and level, -1 where there
+    are none. A robot is put back that is farther from home than ``reach`` along x or y [m]; it starts in the square
+    around it of half-width ``spread`` [m], with the whole trunk off the blocks, or ``among`` them, no foot on one.
     """
 
     model: mujoco.MjModel
@@ -138,10 +131,8 @@ class Ground:
 
 def build_ground(config: GroundConfig) -> Ground:
     """Draw the ground and compile it."""
-    if config.terrain == "rough":
-        return _build_rough(config)
-    if config.terrain == "rooms":
-        return _build_rooms(config)
+    if config.terrain in ("rough", "rooms"):
+        return _build_tiles(config)
     among = config.terrain == "litter"
     half, r = (LITTER_FIELD, _LITTER_RESOLUTION) if among else (FIELD, _RESOLUTION)
     cells = round(2 * (half + 2) / r) + 1
@@ -162,34 +153,19 @@ def build_ground(config: GroundConfig) -> Ground:
     return Ground(model, field, homes, levels, kinds, reach, half * 2 / 3, blocks, Boxes.empty(), among)
 
 
-def _build_rough(config: GroundConfig) -> Ground:
-    terrain = build_terrain(TerrainConfig(seed=UNSEEN + config.seed))
-    return _on_tiles(
-        config, terrain, build_scene(Boxes.empty(), Boxes.empty(), terrain.ground, config.kp, config.kd), 0.5
-    )
-
-
-def _build_rooms(config: GroundConfig) -> Ground:
-    terrain = build_terrain(
-        TerrainConfig(
-            slope=0.0,
-            rough_slope=0.0,
-            stairs_up=0.0,
-            stairs_down=0.0,
-            discrete=0.0,
-            rooms=1.0,
-            columns=_ROOM_COLUMNS,
-            seed=UNSEEN + config.seed,
-            block_density=config.density,
-            wall_blocks=1.0,
-        )
-    )
-    model = build_scene(terrain.tall, terrain.blocks.boxes(), kp=config.kp, kd=config.kd)
-    return _on_tiles(config, terrain, model, _ROOM_SPREAD)
-
-
-def _on_tiles(config: GroundConfig, terrain: Terrain, model: mujoco.MjModel, spread: float) -> Ground:
+def _build_tiles(config: GroundConfig) -> Ground:
     """Robots start in the middles of tiles, on the level asked for or on all beyond the first."""
+    tiles = TerrainConfig(seed=UNSEEN + config.seed)
+    if config.terrain == "rooms":
+        none = {"slope": 0.0, "rough_slope": 0.0, "stairs_up": 0.0, "stairs_down": 0.0, "discrete": 0.0}
+        rooms = {"rooms": 1.0, "columns": _ROOM_COLUMNS, "block_density": config.density, "wall_blocks": 1.0}
+        tiles = replace(tiles, **none, **rooms)
+    terrain, boxes = build_terrain(tiles), Boxes.empty()
+    if config.terrain == "rooms":
+        model = build_scene(terrain.tall, terrain.blocks.boxes(), kp=config.kp, kd=config.kd)
+    else:
+        model = build_scene(boxes, boxes, terrain.ground, config.kp, config.kd)
+    spread = _ROOM_SPREAD if config.terrain == "rooms" else 0.5
     # the first level is level floor, so that 9, 8 ... 1, 9 ... has a mean of at least 5 for any number of robots
     chosen = [config.level] if config.level is not None else list(range(9, 0, -1))
     columns = len(terrain.kinds)

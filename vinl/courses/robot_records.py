@@ -215,16 +215,11 @@ _STEADY = 2
 
 
 class StepCounter:
-    """Counts the steps of n robots, and the dirty ones.
+    """Counts the steps of n robots, the dirty ones, and those dirty by the foot itself.
 
     A step is one swing of a foot and the stance after it, from one lift-off to the next. It is dirty if, meanwhile,
     this foot or its leg (hip, thigh, shank) touched an object. A foot that is stopped by an object for two control
     steps or more and then lifted again has made two steps.
-
-    Attributes:
-        steps: (n,) completed steps.
-        dirty: (n,) those in which the foot or its leg touched an object.
-        dirty_foot: (n,) those in which the foot did.
     """
 
     def __init__(self, n: int) -> None:

@@ -27,13 +27,8 @@ from vinl.world.grid import WALL
 
 @runtime_checkable
 class Herd(Protocol):
-    """Robots in whatever simulator.
-
-    Attributes:
-        qpos: (n, 19), qvel: (n, 18) of all robots, as after the last step or start.
-        touches: what touched blocks in the last step.
-        fallen: (n,) who had fallen at the end of the last step.
-    """
+    """Robots in whatever simulator: ``qpos`` and ``qvel`` of all, as after the last step or start, what touched blocks
+    in the last step, and who had fallen at its end."""
 
     qpos: Float[np.ndarray, "n 19"]
     qvel: Float[np.ndarray, "n 18"]
@@ -43,34 +38,26 @@ class Herd(Protocol):
     @property
     def strain(self) -> Strain | None:
         """What the last step took; None: this simulator does not tell."""
-        ...
 
     def start(self, robot: int, start: Start) -> None:
         """Put a robot somewhere, at rest."""
-        ...
 
     def step(self, targets: Float[np.ndarray, "n 12"]) -> None:
         """One control step to joint targets [rad]."""
-        ...
 
 
 class BoxHerd:
-    """Robots in MuJoCo C, where blocks are boxes."""
+    """Robots in MuJoCo C, where blocks are boxes; see ``Herd``."""
 
     def __init__(self, model: mujoco.MjModel, n: int) -> None:
-        self.touches, self._strain = BlockContacts.none(n), Strain.none(n)
+        self.touches, self.strain = BlockContacts.none(n), Strain.none(n)
         self.fallen = np.zeros(n, bool)
         each = [Robot(model) for _ in range(n)]
-        self._readers = [StrainReader(model, r.data, self.touches, self._strain, k) for k, r in enumerate(each)]
+        self._readers = [StrainReader(model, r.data, self.touches, self.strain, k) for k, r in enumerate(each)]
         for robot, reader in zip(each, self._readers, strict=True):
             robot.contacts = reader
         self._robots = Robots(each)
         self.qpos, self.qvel = self._robots.qpos, self._robots.qvel
-
-    @property
-    def strain(self) -> Strain:
-        """What the last step took."""
-        return self._strain
 
     def start(self, robot: int, start: Start) -> None:
         """Put a robot somewhere, at rest."""
