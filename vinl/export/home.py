@@ -20,15 +20,10 @@ HOME_FILE, EPISODES_FILE = "home.xml", "episodes.json"
 
 
 def export_home(plan: FloorPlan, out: str | Path, episodes: int = 10, obstacles: str = "paper", seed: int = 0) -> Path:
-    """Write a home and episodes in it, the same as those of ``vinl eval``, into a folder.
-
-    ``home.xml`` holds the robot, walls and furniture, and a body ``blocks`` without geoms; ``episodes.json`` the time
-    limit [s] and for each episode start, goal [m], yaw, joint angles [rad], the shortest path [m] and blocks as rows of
-    ``Blocks``.
-
-    Raises:
-        InputError: unknown clutter, no such number of episodes, or the folder cannot be written.
-    """
+    """Write a home and episodes in it, the same as those of ``vinl eval``, into a folder: ``home.xml`` holds the robot,
+    walls and furniture, and a body ``blocks`` without geoms; ``episodes.json`` the time limit [s] and for each episode
+    start, goal [m], yaw, joint angles [rad], the shortest path [m] and blocks as rows of ``Blocks``. Raises
+    ``InputError`` if the clutter is unknown, there is no such number of episodes, or the folder cannot be written."""
     clutter = choose_clutter(obstacles, "obstacles")
     if episodes < 1:
         raise InputError(f"episodes must be at least 1, got {episodes}")

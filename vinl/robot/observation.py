@@ -94,13 +94,8 @@ class ObservationTable:
         return np.concatenate(parts).astype(np.float32)
 
 
-def _scan_points() -> np.ndarray:
-    behind, aside = (round(reach / SCAN_SPACING) for reach in SCAN_REACH)
-    x, y = np.arange(-behind, behind + 1) * SCAN_SPACING, np.arange(-aside, aside + 1) * SCAN_SPACING
-    return np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
-
-
-SCAN_POINTS = _scan_points()
+_LINES = [np.arange(-n, n + 1) * SCAN_SPACING for n in (round(reach / SCAN_SPACING) for reach in SCAN_REACH)]
+SCAN_POINTS = np.stack(np.meshgrid(*_LINES, indexing="ij"), -1).reshape(-1, 2)
 """(187, 2) points about the trunk at which the ground is read, in the heading frame [m], x outer, y inner."""
 
 SCAN_RADIUS = float(np.linalg.norm(SCAN_REACH))

@@ -39,9 +39,7 @@ def run_depth(
 
     ``images_per_s`` is the camera's, from trunk poses to depth; ``bare_images_per_s`` that of a kernel that reads
     finished rays and writes their length; ``share`` the first over the second; ``triangles`` are those of all homes.
-
-    Raises:
-        InputError: the GPU is not there.
+    Raises ``InputError`` if the GPU is not there.
     """
     chosen = check_device(device)
     num_images = (4096 if chosen.type == "cuda" else 32) if num_images is None else num_images
@@ -114,52 +112,37 @@ def _bare_launch(
 
 def _draw_home(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Six rooms with doors, about ten pieces of furniture in each, floor and ceiling: about 80 boxes."""
-    (length, width), (columns, rows) = _SIDE, _ROOMS
-    rows_of = []
-    for k in range(columns + 1):
-        for r in range(rows):
-            rows_of += _wall(rng, k * length / columns, r * width / rows, width / rows, True, 0 < k < columns)
-    for r in range(rows + 1):
-        for k in range(columns):
-            rows_of += _wall(rng, r * width / rows, k * length / columns, length / columns, False, 0 < r < rows)
-    for k in range(columns):
-        for r in range(rows):
-            low = np.array([k * length / columns, r * width / rows])
-            high = low + np.array([length / columns, width / rows])
-            for _ in range(10):
-                # Furniture stands along the walls; the middle of the room stays free for the cameras.
-                at, size = rng.uniform(low + 0.4, high - 0.4), rng.uniform([0.3, 0.3], [0.9, 0.6])
-                axis = rng.integers(2)
-                at[axis] = rng.choice([low[axis] + 0.35, high[axis] - 0.35])
-                yaw = rng.choice([0.0, math.pi / 2]) + rng.normal(0, 0.05)
-                rows_of.append([*at, yaw, *size, 0.0, rng.choice([0.45, 0.75, 0.9, 1.8])])
-    boxes = Boxes(np.array(rows_of))
-    frame = GridFrame(0.5, 0.5, 1.0, (int(width), int(length)))
-    return join_meshes(box_mesh(boxes), floor_mesh(frame), floor_mesh(frame, _CEILING, up=False))
-
-
-def _wall(rng: np.random.Generator, across: float, start: float, length: float, along_y: bool, door: bool) -> list:
-    """One room's side of a wall: a box, or with a door two boxes and a lintel."""
-    if door:
-        a = rng.uniform(0.3, length - 0.3 - _DOOR)
-        parts = [(0.0, a, 0.0), (a, a + _DOOR, 2.0), (a + _DOOR, length, 0.0)]
-    else:
-        parts = [(0.0, length, 0.0)]
-    found = []
-    for low, high, bottom in parts:
-        middle, size = start + (low + high) / 2, high - low
-        xy = (across, middle) if along_y else (middle, across)
-        found.append([*xy, math.pi / 2 if along_y else 0.0, size, _WALL, bottom, _CEILING])
-    return found
+    size = np.array(_SIDE) / _ROOMS
+    rows: list[list[float]] = []
+    for axis, other in ((0, 1), (1, 0)):  # one room's side of a wall: a box, or with a door two boxes and a lintel
+        for line, room in np.ndindex(_ROOMS[axis] + 1, _ROOMS[other]):
+            length = float(size[other])
+            parts = [(0.0, length, 0.0)]
+            if 0 < line < _ROOMS[axis]:
+                a = rng.uniform(0.3, length - 0.3 - _DOOR)
+                parts = [(0.0, a, 0.0), (a, a + _DOOR, 2.0), (a + _DOOR, length, 0.0)]
+            for low, high, bottom in parts:
+                middle = np.array([line * size[axis], room * length + (low + high) / 2])[[axis, other]]
+                rows.append([*middle, math.pi / 2 * other, high - low, _WALL, bottom, _CEILING])
+    for room in np.ndindex(*_ROOMS):
+        low, high = room * size, (np.array(room) + 1) * size
+        for _ in range(10):
+            # Furniture stands along the walls; the middle of the room stays free for the cameras.
+            at, extent = rng.uniform(low + 0.4, high - 0.4), rng.uniform([0.3, 0.3], [0.9, 0.6])
+            axis = rng.integers(2)
+            at[axis] = rng.choice([low[axis] + 0.35, high[axis] - 0.35])
+            yaw = rng.choice([0.0, math.pi / 2]) + rng.normal(0, 0.05)
+            rows.append([*at, yaw, *extent, 0.0, rng.choice([0.45, 0.75, 0.9, 1.8])])
+    frame = GridFrame(0.5, 0.5, 1.0, (int(_SIDE[1]), int(_SIDE[0])))
+    return join_meshes(box_mesh(Boxes(np.array(rows))), floor_mesh(frame), floor_mesh(frame, _CEILING, up=False))
 
 
 def _draw_poses(
     rng: np.random.Generator, n: int, homes: int, device: torch.device
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Trunks in the middle of rooms, any heading, a walking robot's tilt."""
-    (length, width), (columns, rows) = _SIDE, _ROOMS
-    size = np.array([length / columns, width / rows])
-    room = np.column_stack([rng.integers(columns, size=n), rng.integers(rows, size=n)])
+    size = np.array(_SIDE) / _ROOMS
+    room = np.column_stack([rng.integers(count, size=n) for count in _ROOMS])
     xy = (room + 0.5) * size + rng.uniform(-0.5, 0.5, (n, 2)) * (size - 2.2)
     position = np.column_stack([xy, np.full(n, _HEIGHT)])
     yaw_pitch_roll = np.stack([rng.uniform(-math.pi, math.pi, n), rng.normal(0, 0.05, n), rng.normal(0, 0.05, n)], 1)

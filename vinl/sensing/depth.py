@@ -47,14 +47,10 @@ class DepthCamera:
     ``vinl.world.mesh``.
 
     Depth, float32 or float16, is metres along the optical axis (planar, not along the ray); nothing hit, or farther
-    than the camera's far limit, reads as the far limit. The robot's own body is not there.
-
-    ``floor`` is the height of a level floor without end that the meshes leave out [m], which makes rays a third
-    quicker; None: what there is of floor is in the meshes. ``mesh_ids`` are Warp's handles of the meshes, for kernels
-    of one's own.
-
-    Raises:
-        InputError: no mesh, a broken mesh, a dtype that is neither of the two, or a GPU that is not there.
+    than the camera's far limit, reads as the far limit. The robot's own body is not there. ``floor`` is the height of a
+    level floor without end that the meshes leave out [m], which makes rays a third quicker; None: what there is of
+    floor is in the meshes. ``mesh_ids`` are Warp's handles of the meshes, for kernels of one's own. Raises
+    ``InputError`` if there is no mesh, a broken mesh, a dtype that is neither of the two, or a GPU that is not there.
     """
 
     def __init__(
@@ -86,14 +82,9 @@ class DepthCamera:
         self, world: Any, position: Any, rotation: Any, out: torch.Tensor | None = None
     ) -> Float[torch.Tensor, "n height width"]:
         """What the camera on each robot sees [m]: in ``world`` (n,), whose range is not checked on a GPU tensor, from
-        the trunk's ``position`` (n, 3) [m] and ``rotation`` (n, 3, 3), trunk to world.
-
-        It is written into ``out``, of the camera's device and dtype, or a new tensor; on a GPU in order with torch's
-        current stream.
-
-        Raises:
-            InputError: a shape does not fit, or a world does not exist.
-        """
+        the trunk's ``position`` (n, 3) [m] and ``rotation`` (n, 3, 3), trunk to world. It is written into ``out``, of
+        the camera's device and dtype, or a new tensor; on a GPU in order with torch's current stream. Raises
+        ``InputError`` if a shape does not fit, or a world does not exist."""
         position, rotation = self._on_device(position), self._on_device(rotation)
         _check_shapes(world, position, rotation)
         return self.render_poses(world, position + rotation @ self._mount, rotation @ self._turn, out=out)

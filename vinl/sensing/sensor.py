@@ -25,11 +25,9 @@ def mount_errors(xp: Any, roll: Any, pitch: Any) -> Any:
 
 
 class DepthSensor:
-    """The depth cameras of n robots: what is drawn for each of them, and what becomes of their images.
-
-    ``drawn`` is what an episode keeps, tensors (n, ...) by the names of ``sensor_kernels.Cameras``; ``cameras`` is the
-    same memory as kernels read it.
-    """
+    """The depth cameras of n robots: what is drawn for each of them, and what becomes of their images. ``drawn`` is
+    what an episode keeps, tensors (n, ...) by the names of ``sensor_kernels.Cameras``; ``cameras`` is the same memory
+    as kernels read it."""
 
     def __init__(self, config: SensorConfig, camera: Camera, n: int, device: torch.device | str = "cpu") -> None:
         self.config, self._camera, self._device = config, camera, torch.device(device)
