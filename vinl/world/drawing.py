@@ -47,28 +47,20 @@ def draw_floorplan(
         scale = 9.0 / max(extent[1] - extent[0], extent[3] - extent[2])
         size = ((extent[1] - extent[0]) * scale, (extent[3] - extent[2]) * scale + 0.6)
         axes = Figure(figsize=(max(size[0], 3.0), max(size[1], 2.0)), layout="constrained").add_subplot()
-    axes.imshow(
-        np.where(plan.inside, 1.0, np.nan),
-        extent=extent,
-        origin="lower",
-        cmap=ListedColormap([FLOOR]),
-        interpolation="nearest",
-    )
+    floor = np.where(plan.inside, 1.0, np.nan)
+    axes.imshow(floor, extent=extent, origin="lower", cmap=ListedColormap([FLOOR]), interpolation="nearest")
 
     def add(boxes: Boxes, face: str, edge: str, width: float, order: float) -> None:
         if len(boxes):
-            order_by_height = np.argsort(boxes.rows[:, 6], kind="stable")
-            outlines = list(boxes.corners()[order_by_height])
-            axes.add_collection(
-                PolyCollection(outlines, facecolors=face, edgecolors=edge, linewidths=width, zorder=order)
-            )
+            outlines = list(boxes.corners()[np.argsort(boxes.rows[:, 6], kind="stable")])
+            drawn = PolyCollection(outlines, facecolors=face, edgecolors=edge, linewidths=width, zorder=order)
+            axes.add_collection(drawn)
 
-    high = plan.walls.rows[:, 5] >= BODY_HEIGHT
-    add(Boxes(plan.furniture.rows), FURNITURE, EDGE, 0.7, 2)
-    add(Boxes(plan.walls.rows[~high]), WALL, WALL, 0.3, 3)
+    add(plan.furniture, FURNITURE, EDGE, 0.7, 2)
+    add(plan.walls.below(BODY_HEIGHT), WALL, WALL, 0.3, 3)
     shut = plan.windows.rows[:, 5] == 0.0
-    add(Boxes(plan.windows.rows[~shut]), PANE, "white", 0.6, 4)
-    add(Boxes(plan.windows.rows[shut]), DOOR, "white", 0.6, 4)
+    add(plan.windows[~shut], PANE, "white", 0.6, 4)
+    add(plan.windows[shut], DOOR, "white", 0.6, 4)
     if blocks is not None:
         add(blocks.boxes(), BLOCK, "white", 0.4, 5)
     for path in paths:
@@ -86,7 +78,9 @@ def draw_floorplan(
     if title is None:
         title = f"{plan.name.replace('_', ' ')}: {plan.area_m2:.0f} m² of free floor"
     axes.set(xlim=extent[:2], ylim=extent[2:], aspect="equal", title=title)
-    _add_scale_bar(axes, extent)
+    left, low = extent[0] + 0.1, extent[2] + 0.08  # a scale bar, in the strip of outside that every grid keeps
+    axes.plot([left, left + 2], [low, low], color=WALL, linewidth=2, zorder=9)
+    axes.text(left + 2.1, low, "2 m", ha="left", va="center", fontsize=7, color=WALL, zorder=9)
     axes.set_axis_off()
     figure = axes.get_figure(root=True)
     assert figure is not None
@@ -124,10 +118,3 @@ def save_contact_sheet(plans: Sequence[FloorPlan], out: str | Path, columns: int
     for k, plan in enumerate(plans):
         draw_floorplan(plan, figure.add_subplot(rows, columns, k + 1), title=f"{plan.name}: {plan.area_m2:.0f} m²")
     return _save(figure, out, dpi)
-
-
-def _add_scale_bar(axes: Axes, extent: tuple[float, float, float, float]) -> None:
-    """Two metres, lower left, in the strip of outside that every grid keeps."""
-    left, low = extent[0] + 0.1, extent[2] + 0.08
-    axes.plot([left, left + 2], [low, low], color=WALL, linewidth=2, zorder=9)
-    axes.text(left + 2.1, low, "2 m", ha="left", va="center", fontsize=7, color=WALL, zorder=9)

@@ -51,19 +51,12 @@ class RoomLabel:
 
 @dataclass(frozen=True, eq=False)
 class FloorPlan:
-    """One storey of a building.
+    """One storey of a building, from a file, with ``:index`` where that holds several. A lintel over a door is a wall
+    whose bottom is above the floor.
 
-    Attributes:
-        name: short name, for tables and pictures.
-        source: the file it came from, with ``:index`` where the file holds several.
-        walls: upright boxes; a lintel over a door is a box whose bottom is above the floor.
-        furniture: upright boxes.
-        inside: shape (rows, columns), the floor of the building; cells under walls and furniture may be either.
-        free: shape (rows, columns), floor inside that nothing below ``BODY_HEIGHT`` covers.
-        frame: where the cells of both grids lie.
-        windows: panes, and front doors (those from the floor on, bottom 0); only drawn, since a pane or a shut door
-            stops robot and depth camera like the wall does.
-        labels: room names; only drawn.
+    ``inside`` is the floor of the building, cells under walls and furniture may be either; ``free`` that which nothing
+    below ``BODY_HEIGHT`` covers. Windows and room names are only drawn: a pane or a shut door (a window from the floor
+    on, bottom 0) stops robot and depth camera like the wall does.
     """
 
     name: str
@@ -127,13 +120,9 @@ def assemble_floorplan(
     labels: tuple[RoomLabel, ...] = (),
     roomy: bool = False,
 ) -> FloorPlan:
-    """Work out the free floor, cut the grid to the building and refuse what no robot can stand in.
-
-    With ``roomy``, it is known that the robot has room, which saves the time to measure it.
-
-    Raises:
-        InputError: if nothing is inside, nothing is free, or the widest free spot is too small for the robot.
-    """
+    """Work out the free floor, cut the grid to the building and refuse what no robot can stand in. With ``roomy``, it
+    is known that the robot has room, which saves the time to measure it. Raises ``InputError`` if nothing is inside,
+    nothing is free, or the widest free spot is too small for the robot."""
     if not inside.any():
         raise InputError(
             f"{source}: no floor is enclosed by walls; close the outer walls, or check which pixels are walls"

@@ -108,10 +108,8 @@ def comfortable_path(
     """A path for a robot to follow: short, but through the middle of doors and away from walls where there is space.
 
     Floor with less clearance than ``room`` [m] costs up to five times its length, the nearer the wall the more. The
-    points [m] are at most ``PATH_SPACING`` apart, smoothed over 0.3 m.
-
-    Raises:
-        InputError: if the goal cannot be reached from the start.
+    points [m] are at most ``PATH_SPACING`` apart, smoothed over 0.3 m. Raises ``InputError`` if the goal cannot be
+    reached from the start.
     """
     start, goal = _nearest_cell(traversable, frame, start_xy), _nearest_cell(traversable, frame, goal_xy)
     cost = 1.0 + 4.0 * np.square(np.clip(1.0 - clearance / room, 0.0, 1.0))

@@ -16,13 +16,8 @@ from vinl.world.boxes import Boxes
 
 @dataclass(frozen=True)
 class GridFrame:
-    """The frame of a regular grid in the world.
-
-    Attributes:
-        x0, y0: world position of the centre of cell [0, 0] [m].
-        resolution: side of a cell [m].
-        shape: (rows, columns), rows along y, columns along x.
-    """
+    """The frame of a regular grid of (rows, columns), rows along y, columns along x, in the world: the centre of cell
+    [0, 0] and the side of a cell [m]."""
 
     x0: float
     y0: float

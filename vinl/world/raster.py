@@ -28,13 +28,10 @@ def find_largest(regions: Int[np.ndarray, "rows columns"]) -> Bool[np.ndarray, "
 
 def split_rectangles(mask: Bool[np.ndarray, "rows columns"], limit: int = 20_000) -> Int[np.ndarray, "n 4"]:
     """Few rectangles that together cover exactly the true cells of the mask: first row, first column, one past the last
-    row, one past the last column.
+    row, one past the last column. Greedy: the first cell not yet covered (row by row) grows into the larger of two
+    rectangles, widest first or tallest first. Rectangles may overlap, which saves boxes where walls cross.
 
-    Greedy: the first cell not yet covered (row by row) grows into the larger of two rectangles, widest first or tallest
-    first. Rectangles may overlap, which saves boxes where walls cross.
-
-    Raises:
-        InputError: if more than ``limit`` rectangles are needed: such a mask is noise, and no simulator takes it.
+    Raises ``InputError`` if more than ``limit`` are needed: such a mask is noise, and no simulator takes it.
     """
     todo = mask.copy()
     rectangles = []

@@ -51,10 +51,8 @@ def sample_start_goals(
     Pairs are uniform among those whose straight distance is at least ``min_distance`` [m] and that lie at least
     ``clearance`` [m] from walls, furniture and the outside. If no spot of the region has the clearance, 0.4 m (the
     robot can still turn) takes its place; if no two spots are ``min_distance`` apart, 90 % of the region's largest
-    distance does. The pair's note tells of all this.
-
-    Raises:
-        InputError: if the plan has no room for the robot to stand, or a number asked for is not sensible.
+    distance does. The pair's note tells of all this. Raises ``InputError`` if the plan has no room for the robot to
+    stand, or a number asked for is not sensible.
     """
     if n < 0 or not min_distance >= 0 or not clearance >= 0:
         raise InputError("start and goal: number, distance and clearance must not be negative")

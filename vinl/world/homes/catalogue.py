@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import wraps
+from functools import partial, wraps
 from random import Random
 
 Part = tuple[float, float, float, float, float, float, float]
@@ -95,16 +95,6 @@ def table_for_two(rng: Random) -> Things:
     return table_with_chairs(rng, rng.uniform(0.7, 1.2), rng.uniform(0.65, 0.8))
 
 
-def double_bed(rng: Random) -> Things:
-    """A bed for two, its head at the wall, at times with bedside tables."""
-    return bed(rng, True)
-
-
-def single_bed(rng: Random) -> Things:
-    """A bed for one."""
-    return bed(rng, False)
-
-
 def bed(rng: Random, wide: bool) -> Things:
     """A bed, its head at the wall, at times with bedside tables."""
     width, length = (rng.uniform(1.35, 1.85), rng.uniform(1.95, 2.15)) if wide else (rng.uniform(0.8, 1.1), 2.0)
@@ -119,6 +109,9 @@ def bed(rng: Random, wide: bool) -> Things:
             size, gap = rng.uniform(0.35, 0.5), rng.uniform(0.03, 0.1)
             things.append([(size / 2, side * (h + gap + size / 2), 0.0, size, size, 0.0, rng.uniform(0.4, 0.6))])
     return things
+
+
+double_bed, single_bed = partial(bed, wide=True), partial(bed, wide=False)
 
 
 def sofa(rng: Random, length: float | None = None) -> list[Part]:

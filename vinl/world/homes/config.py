@@ -86,7 +86,6 @@ class HomeConfig:
 
 
 _OWN = {
-    "home": {},
     "dead_ends": {"area": (80.0, 300.0)},
     "office": {
         "area": (150.0, 600.0),
@@ -102,7 +101,4 @@ _OWN = {
 def layout_config(layout: str, config: HomeConfig | None = None) -> HomeConfig:
     """Another layout with the walls, doors and furniture of a configuration, but sizes of its own. Raises
     ``InputError`` if there is no such layout."""
-    own = _OWN.get(layout)
-    if own is None:
-        raise InputError(f"homes: layout must be one of {', '.join(LAYOUTS)}, got {layout!r}")
-    return replace(config or HomeConfig(), layout=layout, **own)
+    return replace(config or HomeConfig(), layout=layout, **_OWN.get(layout, {}))

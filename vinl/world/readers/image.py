@@ -34,10 +34,7 @@ def read_image_plan(file: Path, resolution: float | None, min_speck: int, wall_h
 
     Where the picture has transparent parts, walls are its opaque pixels; but if most of what is opaque is light, the
     light is floor, the dark is wall and the transparent is outside. Without transparency, dark is wall. Arguments are
-    those of ``load_floorplan``.
-
-    Raises:
-        InputError: if the picture cannot be read, is empty, or encloses no floor.
+    those of ``load_floorplan``. Raises ``InputError`` if the picture cannot be read, is empty, or encloses no floor.
     """
     colour, alpha = read_pixels(file)
     if alpha.min() == 255:
@@ -157,10 +154,8 @@ def read_ros_map(file: Path, min_speck: int, wall_height: float) -> FloorPlan:
 
     Taken from the file: ``image`` (relative to the file), ``resolution``, ``origin`` with its yaw, ``negate``,
     ``occupied_thresh``, ``free_thresh``, ``mode`` (``raw`` reads pixels as 0-100 and 255; the others share a meaning
-    here). Grey 205 and transparent pixels are unknown.
-
-    Raises:
-        InputError: if the YAML or its picture is missing or broken, or encloses no floor.
+    here). Grey 205 and transparent pixels are unknown. Raises ``InputError`` if the YAML or its picture is missing or
+    broken, or encloses no floor.
     """
     entries = read_yaml(file)
     image = entries.get("image")

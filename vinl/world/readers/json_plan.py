@@ -30,10 +30,8 @@ def read_json_plan(
     ``load_floorplan``.
 
     What is in it tells the format: our own two by their ``schema``, HouseExpo by ``verts``, vectors by walls of four
-    numbers, ProcTHOR otherwise.
-
-    Raises:
-        InputError: if the file is broken, holds no such plan, or the plan has no floor for the robot.
+    numbers, ProcTHOR otherwise. Raises ``InputError`` if the file is broken, holds no such plan, or the plan has no
+    floor for the robot.
     """
     bare, k = file.name.lower().removesuffix(".gz"), index or 0
     plans, as_lines = _read_plans(file), bare.endswith(".jsonl")
@@ -68,13 +66,6 @@ def read_json_plan(
         if isinstance(error, InputError):
             raise error if str(file) in str(error) else InputError(f"{source}: {error}") from None
         raise InputError(f"{source}: the plan has a broken number ({error})") from None
-
-
-def count_plans(file: Path) -> int:
-    """How many plans a file holds. Raises ``InputError`` if it is broken, or no JSON."""
-    if not file.name.lower().removesuffix(".gz").endswith((".json", ".jsonl")):
-        raise InputError(f"{file}: only JSON files hold several plans")
-    return len(_read_plans(file))
 
 
 def _read_plans(file: Path) -> list[Any]:
@@ -155,4 +146,6 @@ def _expand(path: str) -> list[str]:
 def _count(file: str) -> int:
     if not Path(file).is_file():
         raise InputError(f"{file}: no such file")
-    return count_plans(Path(file))
+    if not file.lower().removesuffix(".gz").endswith((".json", ".jsonl")):
+        raise InputError(f"{file}: only JSON files hold several plans")
+    return len(_read_plans(Path(file)))

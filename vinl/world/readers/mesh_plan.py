@@ -196,11 +196,8 @@ def read_mesh_plan(file: Path, up: str | None, scale: float | None, wall_height:
     ``load_floorplan``. Without ``scale`` what cannot be in metres is refused.
 
     The floor is found by its level surface. What rises between ``mesh_plan.STEP`` and 0.6 m above it stands in the
-    robot's way; what goes on up to 1.7 m is a wall, the rest furniture.
-
-    Raises:
-        InputError: if the file is broken or holds no triangles, has no floor, is not in metres, or there is no room
-            or no path for the robot.
+    robot's way; what goes on up to 1.7 m is a wall, the rest furniture. Raises ``InputError`` if the file is broken or
+    holds no triangles, has no floor, is not in metres, or there is no room or no path for the robot.
     """
     vertices, faces = _load(file)
     size = vertices.max(0) - vertices.min(0)

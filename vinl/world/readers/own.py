@@ -14,7 +14,7 @@ from vinl.world.boxes import Boxes
 from vinl.world.floorplan import MAX_CELLS, FloorPlan, RoomLabel, assemble_floorplan
 from vinl.world.grid import GridFrame
 from vinl.world.raster import split_rectangles
-from vinl.world.readers.segments import Opening, Wall, box_along, paint_inside, place_label, raise_walls
+from vinl.world.readers.segments import Opening, Wall, box_along, paint_inside, place_label, raise_walls, read_point
 
 SCHEMA = "vinl/floorplan/1"
 """What the entry ``schema`` of a file that a person wrote says."""
@@ -27,8 +27,10 @@ def build_own_plan(entries: dict[str, Any], name: str, source: str) -> FloorPlan
     """Build a floor plan from ``rooms``, ``walls``, ``doors``, ``windows`` and ``furniture``. Raises ``InputError`` if
     there is no room, a number is not finite, or there is no floor for the robot."""
     height = float(entries.get("height", 2.6))
-    walls = [Wall(_point(w["from"]), _point(w["to"]), float(w["thickness"]), height) for w in entries["walls"]]
-    openings = [Opening(_point(d["from"]), _point(d["to"]), float(d["height"])) for d in entries.get("doors", [])]
+    walls = [Wall(read_point(w["from"]), read_point(w["to"]), float(w["thickness"]), height) for w in entries["walls"]]
+    openings = [
+        Opening(read_point(d["from"]), read_point(d["to"]), float(d["height"])) for d in entries.get("doors", [])
+    ]
     polygons = [np.array(room["outline"], dtype=float).reshape(-1, 2) for room in entries["rooms"]]
     if not polygons or not walls:
         raise InputError(f"{source}: the plan has no rooms or no walls")
@@ -41,7 +43,7 @@ def build_own_plan(entries: dict[str, Any], name: str, source: str) -> FloorPlan
     )
     furniture = Boxes(np.array([_read_thing(thing) for thing in entries.get("furniture", [])]).reshape(-1, 7))
     windows = [
-        box_along(_point(pane["from"]), _point(pane["to"]), 0.08, *(float(v) for v in pane["span"]))
+        box_along(read_point(pane["from"]), read_point(pane["to"]), 0.08, *(float(v) for v in pane["span"]))
         for pane in entries.get("windows", [])
     ]
     return assemble_floorplan(
@@ -54,11 +56,6 @@ def build_own_plan(entries: dict[str, Any], name: str, source: str) -> FloorPlan
         Boxes(np.array(windows).reshape(-1, 7)),
         labels,
     )
-
-
-def _point(entry: Any) -> tuple[float, float]:
-    x, y = entry
-    return float(x), float(y)
 
 
 def _read_thing(thing: dict[str, Any]) -> list[float]:

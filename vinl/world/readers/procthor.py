@@ -30,12 +30,10 @@ DOOR_HEIGHT = 2.1
 def build_procthor_plan(house: dict[str, Any], name: str, source: str, sizes_file: Path) -> FloorPlan:
     """Build a floor plan from one house.
 
-    Rooms' ``floorPolygon`` are the inside; walls become boxes along their lines; doors between rooms are open, doors
-    to the outside stay shut. Objects are boxes turned by ``rotation.y``, of the size that ``sizes_file`` (a JSON
-    object: asset id -> ``{"bbox": [x, y, z]}``) states; without it, or without an entry, cubes of 0.4 m.
-
-    Raises:
-        InputError: if the sizes file is broken, or there is no floor for the robot.
+    Rooms' ``floorPolygon`` are the inside; walls become boxes along their lines; doors between rooms are open, doors to
+    the outside stay shut. Objects are boxes turned by ``rotation.y``, of the size that ``sizes_file`` (a JSON object:
+    asset id -> ``{"bbox": [x, y, z]}``) states; without it, or without an entry, cubes of 0.4 m. Raises ``InputError``
+    if the sizes file is broken, or there is no floor for the robot.
     """
     polygons = [np.array([[p["x"], p["z"]] for p in room["floorPolygon"]], dtype=float) for room in house["rooms"]]
     if not polygons or not house["walls"]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -43,6 +44,12 @@ class Opening:
 
     def __post_init__(self) -> None:
         _check_finite("opening", *self.start, *self.end, self.height)
+
+
+def read_point(entry: Any) -> Point:
+    """Two numbers [m]."""
+    x, y = entry
+    return float(x), float(y)
 
 
 def _check_finite(what: str, *numbers: float) -> None:

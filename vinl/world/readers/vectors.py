@@ -11,7 +11,7 @@ from vinl.world.boxes import FARTHEST, Boxes
 from vinl.world.floorplan import FloorPlan, RoomLabel, assemble_floorplan, frame_around
 from vinl.world.grid import GridFrame
 from vinl.world.raster import find_inside, label_regions, paint_boxes
-from vinl.world.readers.segments import Opening, Wall, box_along, raise_walls
+from vinl.world.readers.segments import Opening, Wall, box_along, raise_walls, read_point
 
 WALL_THICKNESS = 0.12
 """The file's walls are lines; here they are this thick [m]."""
@@ -43,17 +43,15 @@ def build_vector_plan(
     goes before the file's own ``m_per_px_est``.
 
     A door with the outside on one side is a window or the front door and stays closed. Of a sheet with several storeys,
-    which are parts that do not touch, the one with the most floor is kept.
-
-    Raises:
-        InputError: if the scale is missing or out of reason, or there is no floor for the robot.
+    which are parts that do not touch, the one with the most floor is kept. Raises ``InputError`` if the scale is
+    missing or out of reason, or there is no floor for the robot.
     """
     scale = metres_per_pixel or entries.get("m_per_px_est")
     if not isinstance(scale, int | float) or not 1e-4 <= scale <= 1.0:
         raise InputError(f"{source}: the scale m_per_px_est is {scale}; give metres per pixel with --resolution")
     lines = _to_metres(entries["walls"], scale)
     doors = _to_metres(entries.get("doors", []), scale)
-    walls = [Wall(_point(line[:2]), _point(line[2:]), WALL_THICKNESS, wall_height) for line in lines]
+    walls = [Wall(read_point(line[:2]), read_point(line[2:]), WALL_THICKNESS, wall_height) for line in lines]
     ends = lines.reshape(-1, 2)
     frame = frame_around(ends.min(0) - WALL_THICKNESS, ends.max(0) + WALL_THICKNESS, source)
     shut = paint_boxes(Boxes(raise_walls(walls, [])), frame)
@@ -63,7 +61,8 @@ def build_vector_plan(
     if not inside.any():
         raise InputError(f"{source}: the walls enclose no floor; is the outline closed?")
     storey = storeys == sizes[1:].argmax() + 1
-    openings = [_open(door) for door in doors if _leads_inside(door, inside & storey, frame)]
+    ways = [door for door in doors if _leads_inside(door, inside & storey, frame)]
+    openings = [Opening(read_point(door[:2]), read_point(door[2:]), DOOR_HEIGHT) for door in ways]
     boxes = Boxes(raise_walls(walls, openings))
     if openings:  # the floor of a doorway belongs to the inside
         inside |= paint_boxes(
@@ -109,14 +108,6 @@ def _to_metres(entries: list[Any], scale: float) -> np.ndarray:
     if (np.abs(rows) > FARTHEST / scale).any():
         raise InputError(f"a wall, door or icon has a coordinate beyond {FARTHEST:g} m")
     return rows * scale * np.array([1.0, -1.0, 1.0, -1.0])
-
-
-def _point(xy: np.ndarray) -> tuple[float, float]:
-    return float(xy[0]), float(xy[1])
-
-
-def _open(door: np.ndarray) -> Opening:
-    return Opening(_point(door[:2]), _point(door[2:]), DOOR_HEIGHT)
 
 
 def _leads_inside(door: np.ndarray, inside: np.ndarray, frame: GridFrame) -> bool:
