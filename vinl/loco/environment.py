@@ -17,7 +17,7 @@ from vinl.loco.config import MAX_LATENCY, LocoConfig, RandomisationConfig, Rewar
 from vinl.loco.curriculum import next_levels
 from vinl.loco.measures import TERMS, average_sums, sum_measures, tile_cover
 from vinl.loco.nan_guard import KEPT, REASONS, Lost, keep_lost
-from vinl.loco.randomisation import draw_commands, split_by_name, uniform
+from vinl.loco.randomisation import draw_commands, uniform
 from vinl.loco.rewards import Motion, reward_terms
 from vinl.loco.simulation import Body, Contacts, DeviceGround, Simulation, delay_steps
 from vinl.loco.state import EnvState, begin_episode, count_steps, first_state, strip_weak_types
@@ -87,17 +87,6 @@ class Settings(NamedTuple):
 
     rewards: dict[str, Any]
     noise: np.float32
-
-
-class StepKeys(NamedTuple):
-    """Random states that a step draws from."""
-
-    state: Array
-    episode: Array
-    command: Array
-    level: Array
-    push: Array
-    velocity_error: Array
 
 
 class LocoEnvironment:
@@ -248,7 +237,7 @@ class LocoEnvironment:
         self, ground: DeviceGround, old: EnvState, lost: Lost, given: Float[Array, "n 12"], settings: Settings
     ) -> tuple[EnvState, Lost, StepResult]:
         c, n, rewards = self.config, self.num_envs, settings.rewards
-        keys = split_by_name(StepKeys, old.key)
+        key, of_episode, of_command, of_level, of_push, of_error = jax.random.split(old.key, 6)
         action = jnp.clip(jnp.nan_to_num(given), -CLIP, CLIP)
         target = jnp.asarray(DEFAULT_POSE, jnp.float32) + ACTION_SCALE * action
         targets = jnp.concatenate([target[:, None], old.targets[:, :-1]], 1)
@@ -301,7 +290,7 @@ class LocoEnvironment:
             way,
             commanded,
             jnp.maximum(life, 1) / self.episode_steps,
-            jax.random.uniform(keys.level, (n,)),
+            jax.random.uniform(of_level, (n,)),
             hits,
         )
         moved = jnp.linalg.norm(body.qpos[:, :2] - old.body.qpos[:, :2], axis=1)
@@ -311,13 +300,13 @@ class LocoEnvironment:
 
         # pushes, errors of what is measured, new starts, new commands
         push = old.push_left <= 0
-        shove = uniform(keys.push, (n, 2), (-c.randomisation.push_speed, c.randomisation.push_speed))
+        shove = uniform(of_push, (n, 2), (-c.randomisation.push_speed, c.randomisation.push_speed))
         body = body._replace(qvel=jnp.where(push[:, None], body.qvel.at[:, :2].set(shove), body.qvel))
         kept = math.exp(-CONTROL_DT / c.randomisation.velocity_bias_time)
-        fresh_error = c.randomisation.velocity_bias * jax.random.normal(keys.velocity_error, (n, 3))
+        fresh_error = c.randomisation.velocity_bias * jax.random.normal(of_error, (n, 3))
         level = jnp.where(done, level, old.level)
-        start = begin_episode(c, self._starts, level, old.column, keys.episode)
-        command, left = draw_commands(c.commands, keys.command, n)
+        start = begin_episode(c, self._starts, level, old.column, of_episode)
+        command, left = draw_commands(c.commands, of_command, n)
         renew = done | (old.command_left <= 0)
 
         def ended(beginning: Any, going: Any) -> Any:
@@ -327,7 +316,7 @@ class LocoEnvironment:
             )
 
         state = EnvState(
-            key=keys.state,
+            key=key,
             body=ended(start.body, body),
             action=ended(jnp.zeros_like(action), action),
             targets=ended(start.targets, targets),
@@ -380,7 +369,6 @@ class LocoEnvironment:
             linear=rotate_inverse(jnp, quaternion, body.qvel[:, :3]),
             angular=body.qvel[:, 3:6],
             gravity=gravity,
-            height_error=steps.height_error,
             joint_speed=body.qvel[:, 6:],
             last_joint_speed=old.body.qvel[:, 6:],
             torque=torque,
@@ -389,12 +377,7 @@ class LocoEnvironment:
             command=old.command,
             contacts=contacts,
             landed=old.flying & (contacts.foot | old.touched),
-            path_error=steps.path_error,
-            swing=steps.swing,
-            middle=steps.middle,
-            gap=steps.gap,
-            blocked=steps.blocked,
-            foot_speed=steps.speed,
+            steps=steps,
             fallen=contacts.trunk_down | (gravity[:, 2] > _UPSIDE) | broken,
         )
 

@@ -90,10 +90,10 @@ def sum_measures(
         "clipped": clipped,
         "crossing": m.contacts.crossing,
         "too_fast": (jnp.abs(m.joint_speed) > jnp.asarray(JOINT_SPEED_LIMIT, jnp.float32)).any(1),
-        "swings": m.swing.sum(1),
-        "foot_error2": jnp.sum(distance2(m.path_error), 1),
-        "swing_hits": (m.middle & m.contacts.foot).sum(1),
-        "blocked": m.blocked.sum(1),
+        "swings": m.steps.swing.sum(1),
+        "foot_error2": jnp.sum(distance2(m.steps.path_error), 1),
+        "swing_hits": (m.steps.middle & m.contacts.foot).sum(1),
+        "blocked": m.steps.blocked.sum(1),
     }
     ordered = [values[name] for name in MEASURES] + [weighted[name] for name in TERMS]
     return jnp.stack([jnp.sum(jnp.nan_to_num(value), dtype=jnp.float32) for value in ordered])
@@ -107,11 +107,10 @@ def average_sums(sums: Float[np.ndarray, " m"]) -> dict[str, float]:
     ends = max(raw["falls"] + raw["timeouts"], 1.0)
     return {
         "reward": raw["reward"] / steps / CONTROL_DT,
-        "linear_tracking": raw["linear_tracking"] / steps,
-        "yaw_tracking": raw["yaw_tracking"] / steps,
+        **{name: raw[name] / steps for name in ("linear_tracking", "yaw_tracking", "level", "clipped", "too_fast")},
+        "leg_crossing": raw["crossing"] / steps,
         "linear_rmse": math.sqrt(raw["linear_error2"] / steps),
         "yaw_rmse": math.sqrt(raw["yaw_error2"] / steps),
-        "level": raw["level"] / steps,
         "falls_per_minute": raw["falls"] / (steps * CONTROL_DT / 60),
         "speed": raw["metres"] / (steps * CONTROL_DT),
         "episode_seconds": raw["episode_steps"] / ends * CONTROL_DT,
@@ -120,9 +119,6 @@ def average_sums(sums: Float[np.ndarray, " m"]) -> dict[str, float]:
         "foot_wall_per_m": raw["foot_wall"] / metres,
         "trunk_over_blocks": raw["over_block"] / max(raw["covered"], 1.0),
         "stride": FEET * raw["metres"] / max(raw["landings"], 1.0),
-        "clipped": raw["clipped"] / steps,
-        "leg_crossing": raw["crossing"] / steps,
-        "too_fast": raw["too_fast"] / steps,
         "foot_rmse": math.sqrt(raw["foot_error2"] / max(raw["swings"], 1.0)),
         "swing_hits": raw["swing_hits"] / max(raw["swings"], 1.0),
         "plan_blocked": raw["blocked"] / max(raw["swings"], 1.0),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -11,13 +11,6 @@ from jaxtyping import Array, Float, Int
 from vinl.config.limits import Range
 from vinl.loco.config import RandomisationConfig
 from vinl.robot.commands import UNIFORM, CommandConfig, make_commands
-
-Keys = TypeVar("Keys", bound=tuple)
-
-
-def split_by_name(kind: type[Keys], key: Array) -> Keys:
-    """A random state for every field of a named tuple: what is drawn from one does not change with what others draw."""
-    return kind(*jax.random.split(key, len(kind._fields)))  # type: ignore[attr-defined]
 
 
 def uniform(key: Array, shape: tuple[int, ...], bounds: Range) -> Array:
@@ -56,7 +49,7 @@ class Traits(NamedTuple):
 
 def draw_traits(config: RandomisationConfig, key: Array, n: int) -> Traits:
     """Traits of n robots."""
-    keys = split_by_name(Traits, key)
+    keys = Traits(*jax.random.split(key, len(Traits._fields)))
     turn, tilt = config.angular_velocity_bias, config.gravity_bias
     return Traits(
         friction=uniform(keys.friction, (n,), config.friction),

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from vinl.loco.simulation import Contacts
+from vinl.loco.walking import Steps
 from vinl.robot.aliengo import CONTROL_DT, JOINT_SPEED_LIMIT
 
 TRACKING = ((0.3, 0.02), (0.3, 0.003), (0.4, 0.0006))
@@ -19,10 +20,6 @@ FAST = 0.9
 
 MAX_SLIP = 1.0
 """A foot that slips faster than this costs no more [m/s]."""
-
-MIDDLE = (0.2, 0.85)
-"""Between these fractions of its swing a foot should touch nothing."""
-
 
 HEIGHT_WIDTH = 0.02
 """A hip so far from the height that footholds are chosen for has two thirds of its price [m]: 2 cm lower, and no shank
@@ -38,25 +35,19 @@ class Motion(NamedTuple):
     Attributes:
         linear, angular: (n, 3) velocity of the trunk [m/s, rad/s].
         gravity: (n, 3) unit vector down.
-        height_error: (n, 4) of each hip over its foot, against the gait's [m]; 0 of feet that swing.
         joint_speed, last_joint_speed: (n, 12) now and a control step ago [rad/s].
         torque: (n, 12) [N m].
         action, last_action: (n, 12).
         command: (n, 3) forward, left [m/s], yaw rate [rad/s].
         contacts: latched over the control step.
         landed: (n, 4) feet that touch down in this step.
-        path_error: (n, 4, 3) from each foot to where its path has it [m]; 0 of feet that stand.
-        swing, middle: (n, 4) which feet swing by the clock, and are in the middle of it.
-        gap: (n, 4) from each leg below the knee to the nearest block or wall [m].
-        blocked: (n, 4) swinging feet whose foothold is on a block or beside it.
-        foot_speed: (n, 4) of the feet along the ground [m/s].
+        steps: how the feet kept to the gait.
         fallen: (n,).
     """
 
     linear: Float[Array, "n 3"]
     angular: Float[Array, "n 3"]
     gravity: Float[Array, "n 3"]
-    height_error: Float[Array, "n 4"]
     joint_speed: Float[Array, "n 12"]
     last_joint_speed: Float[Array, "n 12"]
     torque: Float[Array, "n 12"]
@@ -65,12 +56,7 @@ class Motion(NamedTuple):
     command: Float[Array, "n 3"]
     contacts: Contacts
     landed: Bool[Array, "n 4"]
-    path_error: Float[Array, "n 4 3"]
-    swing: Bool[Array, "n 4"]
-    middle: Bool[Array, "n 4"]
-    gap: Float[Array, "n 4"]
-    blocked: Bool[Array, "n 4"]
-    foot_speed: Float[Array, "n 4"]
+    steps: Steps
     fallen: Bool[Array, " n"]
 
 
@@ -91,29 +77,30 @@ def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"
     """
     error2 = jnp.sum((m.command[:, :2] - m.linear[:, :2]) ** 2, 1)
     foot_hit, shank_hit = m.contacts.foot_block | m.contacts.foot_wall, m.contacts.shank_block | m.contacts.shank_wall
-    lack = jnp.maximum(m.path_error[..., 2], 0.0)
-    tracking = sum(weight * jnp.exp(-distance2(m.path_error) / width) for weight, width in TRACKING)
+    steps = m.steps
+    lack = jnp.maximum(steps.path_error[..., 2], 0.0)
+    tracking = sum(weight * jnp.exp(-distance2(steps.path_error) / width) for weight, width in TRACKING)
     fast = jnp.maximum(jnp.abs(m.joint_speed) - jnp.asarray(FAST * JOINT_SPEED_LIMIT, jnp.float32), 0.0)
-    slip = jnp.where(m.swing, 0.0, jnp.minimum(m.foot_speed, MAX_SLIP))
+    slip = jnp.where(steps.swing, 0.0, jnp.minimum(steps.speed, MAX_SLIP))
     return {
         "linear_velocity": jnp.exp(-error2 / sigma),
         "yaw_rate": jnp.exp(-((m.command[:, 2] - m.angular[:, 2]) ** 2) / sigma),
         "vertical_velocity": m.linear[:, 2] ** 2,
         "roll_pitch_rate": jnp.sum(m.angular[:, :2] ** 2, 1),
         "orientation": jnp.sum(m.gravity[:, :2] ** 2, 1),
-        "hip_height": 1.0 - jnp.exp(-((m.height_error / HEIGHT_WIDTH) ** 2)).mean(1),
+        "hip_height": 1.0 - jnp.exp(-((steps.height_error / HEIGHT_WIDTH) ** 2)).mean(1),
         "torque": jnp.sum(m.torque**2, 1),
         "joint_acceleration": jnp.sum(((m.joint_speed - m.last_joint_speed) / CONTROL_DT) ** 2, 1),
         "joint_speed": jnp.sum(fast**2, 1),
         "action_rate": jnp.sum((m.action - m.last_action) ** 2, 1),
-        "foot_tracking": jnp.mean(jnp.where(m.swing, tracking, m.contacts.foot), 1),
-        "clearance": jnp.sum(jnp.where(m.swing, lack, 0.0), 1),
-        "swing_contact": jnp.sum(m.middle & m.contacts.foot, 1).astype(jnp.float32),
+        "foot_tracking": jnp.mean(jnp.where(steps.swing, tracking, m.contacts.foot), 1),
+        "clearance": jnp.sum(jnp.where(steps.swing, lack, 0.0), 1),
+        "swing_contact": jnp.sum(steps.middle & m.contacts.foot, 1).astype(jnp.float32),
         "slip": jnp.sum(slip**2, 1),
         "collision": m.contacts.shank.sum(1) + m.contacts.trunk.astype(jnp.float32),
         "obstacle_contact": foot_hit.sum(1).astype(jnp.float32),
         "leg_contact": shank_hit.sum(1).astype(jnp.float32),
-        "near_block": jnp.sum(jnp.clip(1.0 - m.gap / MARGIN, 0.0, 1.0), 1),
+        "near_block": jnp.sum(jnp.clip(1.0 - steps.gap / MARGIN, 0.0, 1.0), 1),
         "leg_crossing": m.contacts.crossing.astype(jnp.float32),
         "fall": m.fallen / CONTROL_DT,
     }

@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Float, Int
 from vinl.gait.state import GaitState
 from vinl.loco.config import LocoConfig, RandomisationConfig
 from vinl.loco.measures import MEASURES, TERMS
-from vinl.loco.randomisation import Traits, draw_commands, draw_traits, split_by_name, uniform
+from vinl.loco.randomisation import Traits, draw_commands, draw_traits, uniform
 from vinl.loco.simulation import PAST, Body
 from vinl.loco.walking import begin_gait
 from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
@@ -63,34 +63,6 @@ class EnvState(NamedTuple):
     sums: Float[Array, " m"]
 
 
-class StartKeys(NamedTuple):
-    """Random states that starts are drawn from."""
-
-    place: Array
-    yaw: Array
-    joints: Array
-    velocity: Array
-
-
-class EpisodeKeys(NamedTuple):
-    """Random states that an episode begins with."""
-
-    body: Array
-    traits: Array
-    velocity_error: Array
-
-
-class FirstKeys(NamedTuple):
-    """Random states that a training begins with."""
-
-    state: Array
-    episode: Array
-    command: Array
-    level: Array
-    push: Array
-    step: Array
-
-
 class Episode(NamedTuple):
     """What begins with an episode: fields of ``EnvState``."""
 
@@ -121,18 +93,18 @@ def start_body(
         level, column: tile of each robot.
         key: random state.
     """
-    c, n, keys = randomisation, len(level), split_by_name(StartKeys, key)
-    middle, yaw, zero = starts[level, column], uniform(keys.yaw, (n,), (-jnp.pi, jnp.pi)), jnp.zeros(n)
+    c, n, (of_place, of_yaw, of_joints, of_velocity) = randomisation, len(level), jax.random.split(key, 4)
+    middle, yaw, zero = starts[level, column], uniform(of_yaw, (n,), (-jnp.pi, jnp.pi)), jnp.zeros(n)
     qpos = jnp.concatenate(
         [
-            middle[:, :2] + uniform(keys.place, (n, 2), (-c.start_xy, c.start_xy)),
+            middle[:, :2] + uniform(of_place, (n, 2), (-c.start_xy, c.start_xy)),
             middle[:, 2:] + c.start_height,
             jnp.stack([jnp.cos(yaw / 2), zero, zero, jnp.sin(yaw / 2)], 1),
-            jnp.asarray(DEFAULT_POSE, jnp.float32) * uniform(keys.joints, (n, 12), _about(1.0, c.start_joints)),
+            jnp.asarray(DEFAULT_POSE, jnp.float32) * uniform(of_joints, (n, 12), _about(1.0, c.start_joints)),
         ],
         1,
     )
-    velocity = uniform(keys.velocity, (n, 6), _about(0.0, c.start_velocity))
+    velocity = uniform(of_velocity, (n, 6), _about(0.0, c.start_velocity))
     return Body(qpos, jnp.concatenate([velocity, jnp.zeros((n, 12))], 1), jnp.zeros((n, 18)))
 
 
@@ -148,14 +120,14 @@ def begin_episode(
     key: Array,
 ) -> Episode:
     """All robots at a start; arguments as for ``start_body``."""
-    c, n, keys = config.randomisation, len(level), split_by_name(EpisodeKeys, key)
-    body = start_body(c, starts, level, column, keys.body)
+    c, n, (of_body, of_traits, of_error) = config.randomisation, len(level), jax.random.split(key, 3)
+    body = start_body(c, starts, level, column, of_body)
     return Episode(
         body=body,
         targets=jnp.tile(jnp.asarray(DEFAULT_POSE, jnp.float32), (n, PAST, 1)),
         gait=begin_gait(config.gait, body),
-        velocity_error=c.velocity_bias * jax.random.normal(keys.velocity_error, (n, 3)),
-        traits=draw_traits(c, keys.traits, n),
+        velocity_error=c.velocity_bias * jax.random.normal(of_error, (n, 3)),
+        traits=draw_traits(c, of_traits, n),
     )
 
 
@@ -167,22 +139,23 @@ def first_state(config: LocoConfig, starts: Float[Array, "levels columns 3"], ke
         starts: as for ``start_body``.
         key: random state.
     """
-    c, n, keys = config, config.num_envs, split_by_name(FirstKeys, key)
+    c, n = config, config.num_envs
+    own, of_episode, of_command, of_level, of_push, of_step = jax.random.split(key, 6)
     highest = min(c.curriculum.first_level, c.terrain.levels - 1)
-    level = jax.random.randint(keys.level, (n,), 0, highest + 1)
+    level = jax.random.randint(of_level, (n,), 0, highest + 1)
     column = (jnp.arange(n) % c.terrain.columns).astype(jnp.int32)
-    command, left = draw_commands(c.commands, keys.command, n)
-    start = begin_episode(c, starts, level, column, keys.episode)
+    command, left = draw_commands(c.commands, of_command, n)
+    start = begin_episode(c, starts, level, column, of_episode)
     state = EnvState(
-        key=keys.state,
+        key=own,
         body=start.body,
         action=jnp.zeros((n, 12)),
         targets=start.targets,
         gait=start.gait,
         command=command,
         command_left=left,
-        push_left=(uniform(keys.push, (n,), (0.0, c.randomisation.push_interval)) / CONTROL_DT).astype(jnp.int32),
-        step=jax.random.randint(keys.step, (n,), 0, count_steps(c)),
+        push_left=(uniform(of_push, (n,), (0.0, c.randomisation.push_interval)) / CONTROL_DT).astype(jnp.int32),
+        step=jax.random.randint(of_step, (n,), 0, count_steps(c)),
         life=jnp.zeros(n, jnp.int32),
         touched=jnp.zeros((n, 4), bool),
         flying=jnp.zeros((n, 4), bool),

@@ -24,11 +24,13 @@ from vinl.gait.state import (
     tick,
     velocity_in_heading_frame,
 )
-from vinl.loco.rewards import MIDDLE
 from vinl.loco.simulation import SHANK_REACH, Body, DeviceGround
 from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS, HIPS
 from vinl.robot.rotation import rotate_inverse
 from vinl.world.grid import GridFrame
+
+MIDDLE = (0.2, 0.85)
+"""Between these fractions of its swing a foot should touch nothing."""
 
 _ALONG_SHANK = (0.12, 0.25, 0.4, 0.6, 0.8)
 """Places along a shank that are held against blocks, from the foot (0) to the knee (1)."""
