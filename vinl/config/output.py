@@ -71,14 +71,22 @@ def round_numbers(value: Any) -> Any:
 
 @contextlib.contextmanager
 def write_whole(path: Path) -> Iterator[IO[bytes]]:
-    """A file to write to that takes the place of an older one at the end of the context, whole or not at all."""
+    """A file to write to that takes the place of an older one at the end of the context, whole or not at all.
+
+    Raises:
+        OSError: it cannot be written; it names the file.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, scratch = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
             yield file
+            file.flush()
+            os.fsync(handle)
         Path(scratch).chmod(0o644)
         Path(scratch).replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
     finally:
         Path(scratch).unlink(missing_ok=True)
 

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple, Protocol, cast
 import torch
 from jaxtyping import Bool, Float
 from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load_file, save
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
+from vinl.config.output import write_whole
 from vinl.nav.config import NavCameraConfig, NavConfig
 from vinl.policies.card import PolicyCard
 from vinl.policies.depth_memory import State
@@ -24,29 +25,12 @@ from vinl.policies.own_map import MapGeometry
 
 
 class MemoryActor(Protocol):
-    """What a ``PolicyNetwork`` needs to be trained with a critic beside it (``NavActor`` has it).
+    """What a ``PolicyNetwork`` needs to be trained with a critic beside it; see ``NavActor``, which has it."""
 
-    Attributes:
-        image: (height, width) of the depth image [pixels], or None if blind.
-        feature_size: numbers in a feature.
-    """
-
-    image: tuple[int, int] | None
     feature_size: int
-    observation_size: int
-    action_size: int
 
-    def initial_state(self, n: int, device: Any = None) -> State:
-        """The memory of n robots that have seen nothing."""
-        ...
-
-    def look(self, depth: Any, vector: Any, state: State, fresh: Any) -> tuple[Any, State]:
-        """Features (t, n, f) of t steps and the last state."""
-        ...
-
-    def choose(self, feature: Any) -> Any:
-        """Mean actions (t, n, a)."""
-        ...
+    def look(self, depth: Any, vector: Any, state: State, fresh: Any) -> tuple[Any, State]: ...
+    def choose(self, feature: Any) -> Any: ...
 
 
 class Outlook(NamedTuple):
@@ -274,9 +258,8 @@ def load_start(policy: str, config: NavConfig) -> tuple[dict[str, torch.Tensor],
 def save_critic(model: RecurrentActorCritic, folder: Path) -> None:
     """What a policy folder leaves away, for ``--from``: the critic, and the spread of the actions."""
     rest = {k: v.detach().cpu().contiguous() for k, v in model.state_dict().items() if not k.startswith("actor.")}
-    scratch = folder / (CRITIC + ".new")
-    save_file(rest, scratch)
-    scratch.replace(folder / CRITIC)
+    with write_whole(folder / CRITIC) as file:
+        file.write(save(rest))
 
 
 def load_critic(model: RecurrentActorCritic, folder: Path) -> bool:

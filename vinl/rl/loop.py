@@ -83,45 +83,19 @@ Figures = Callable[[dict[str, float]], dict[str, str]]
 
 @runtime_checkable
 class Algorithm(Protocol):
-    """A learner with the names of rsl-rl's algorithms.
-
-    Attributes:
-        learning_rate: of the next update.
-    """
+    """A learner with the names of rsl-rl's algorithms; ``update`` gives the losses by name, ``get_policy`` what is
+    exported, and ``load`` takes back what ``save`` gave."""
 
     learning_rate: float
 
-    def act(self, obs: Any) -> torch.Tensor:
-        """Actions for the roll-out, without gradients."""
-        ...
-
-    def process_env_step(self, obs: Any, rewards: Any, dones: Any, extras: Any) -> None:
-        """Take note of what the actions led to."""
-        ...
-
-    def compute_returns(self, obs: Any) -> None:
-        """The roll-out is complete."""
-        ...
-
-    def update(self) -> dict[str, float]:
-        """Learn from the roll-out; losses by name."""
-        ...
-
-    def train_mode(self) -> None:
-        """Before the first roll-out."""
-        ...
-
-    def get_policy(self) -> Any:
-        """What is exported."""
-        ...
-
-    def save(self) -> dict[str, Any]:
-        """Tensors and plain data that ``load`` takes back."""
-        ...
-
-    def load(self, loaded_dict: dict[str, Any], load_cfg: dict | None, strict: bool) -> Any:
-        """Go on from what was saved."""
-        ...
+    def train_mode(self) -> None: ...
+    def act(self, obs: Any) -> torch.Tensor: ...
+    def process_env_step(self, obs: Any, rewards: Any, dones: Any, extras: Any) -> None: ...
+    def compute_returns(self, obs: Any) -> None: ...
+    def update(self) -> dict[str, float]: ...
+    def get_policy(self) -> Any: ...
+    def save(self) -> dict[str, Any]: ...
+    def load(self, loaded_dict: dict[str, Any], load_cfg: dict | None, strict: bool) -> Any: ...
 
 
 class TrainingLoop:

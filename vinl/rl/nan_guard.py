@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import torch
 
@@ -18,22 +18,14 @@ class NotFiniteError(Exception):
     """A training cannot go on; the message is one line."""
 
 
-@runtime_checkable
-class GuardedEnv(Protocol):
-    """An environment that keeps the states before the steps that went wrong."""
-
-    def take_lost(self) -> list[dict[str, Any]]:
-        """Those since the last call."""
-        ...
-
-
 def judge_losses(
     env: Any, measures: Mapping[str, float], robot_steps: int, iteration: int, folder: RunFolder
 ) -> str | None:
     """Save the robots whose numbers went wrong in an iteration.
 
     Args:
-        env: asked for their states where ``measures`` has ``not_finite`` above zero; else nothing waits for the device.
+        env: asked for their states (``take_lost``, if it keeps them) where ``measures`` has ``not_finite`` above zero;
+            else nothing waits for the device.
         measures: of the iteration.
         robot_steps: of the iteration.
         iteration: its number.
@@ -46,10 +38,9 @@ def judge_losses(
     if not count:
         return None
     reasons: dict[str, int] = {}
-    if isinstance(env, GuardedEnv):
-        for state in env.take_lost():
-            folder.save_lost({**state, "iteration": iteration})
-            reasons[state["reason"]] = reasons.get(state["reason"], 0) + 1
+    for state in env.take_lost() if hasattr(env, "take_lost") else ():
+        folder.save_lost({**state, "iteration": iteration})
+        reasons[state["reason"]] = reasons.get(state["reason"], 0) + 1
     if count <= max(1.0, MAX_FRACTION * robot_steps):
         return None
     causes = f" ({', '.join(sorted(reasons, key=lambda name: -reasons[name]))})" if reasons else ""

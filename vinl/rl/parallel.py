@@ -14,8 +14,9 @@ import torch
 import torch.distributed as dist
 from torch import Tensor, nn
 
+from vinl.config.output import write_text
 from vinl.rl.loop import TrainingLoop
-from vinl.rl.run_folder import RunFolder, write_text
+from vinl.rl.run_folder import RunFolder
 
 
 class Peers:
@@ -184,11 +185,6 @@ class FollowerFolder(RunFolder):
 
     def cut_metrics(self, iteration: int) -> None:
         """The first process writes the curves."""
-
-    def save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
-        """Robots, their memory, and random numbers."""
-        self.path.mkdir(parents=True, exist_ok=True)
-        super().save_checkpoint(checkpoint)
 
     def load_checkpoint(self) -> dict[str, Any] | None:
         """The run's checkpoint with this process's own robots; without any they begin anew.

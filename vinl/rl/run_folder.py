@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import pickle
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import torch
 import yaml
 
 from vinl.config.errors import InputError
+from vinl.config.output import write_text, write_whole
 
 CONFIG = "config.yaml"
 METRICS = "metrics.jsonl"
@@ -54,7 +54,6 @@ class RunFolder:
             raise InputError(f"{self.path} is a file; choose a folder for the run with --out")
         if (self.path / CONFIG).exists():
             raise InputError(f"{self.path} holds a run already; continue it with --resume, or choose another --out")
-        self.path.mkdir(parents=True, exist_ok=True)
         write_text(self.path / CONFIG, yaml.safe_dump(config, sort_keys=False))
 
     def open(self) -> dict[str, Any]:
@@ -100,7 +99,8 @@ class RunFolder:
         """
         packed = io.BytesIO()  # torch.save itself does not say what is wrong with the disk
         torch.save(checkpoint, packed)
-        _write(self.path / CHECKPOINT, packed.getbuffer())
+        with write_whole(self.path / CHECKPOINT) as file:
+            file.write(packed.getbuffer())
 
     def load_checkpoint(self) -> dict[str, Any] | None:
         """The newest checkpoint on the CPU, or None when the run was stopped before its first.
@@ -127,16 +127,12 @@ class RunFolder:
             The file ``not_finite/NUMBER.npz``; None: the run keeps ``MAX_LOST`` of them already.
         """
         folder = self.path / LOST
-        folder.mkdir(parents=True, exist_ok=True)
         number = len(list(folder.glob("*.npz"))) + 1
         if number > MAX_LOST:
             return None
-        file = folder / f"{number:06d}.npz"
-        scratch = file.with_suffix(".new")
-        config = self.path / CONFIG
-        with scratch.open("wb") as stream:
+        file, config = folder / f"{number:06d}.npz", self.path / CONFIG
+        with write_whole(file) as stream:
             np.savez(stream, config=config.read_text(encoding="utf-8") if config.is_file() else "", **state)
-        scratch.replace(file)
         return file
 
     def append_metrics(self, row: dict[str, float]) -> None:
@@ -162,24 +158,3 @@ class RunFolder:
                 break
             kept.append(line + "\n")
         write_text(file, "".join(kept))
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all."""
-    _write(path, text.encode())
-
-
-def _write(path: Path, data: bytes | memoryview) -> None:
-    scratch = path.with_name(path.name + ".new")
-    try:
-        with scratch.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        scratch.replace(path)
-    except OSError as error:
-        scratch.unlink(missing_ok=True)
-        raise OSError(error.errno, error.strerror, str(path)) from None
-    except BaseException:
-        scratch.unlink(missing_ok=True)
-        raise
