@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 
 from vinl.config.errors import InputError
-from vinl.config.limits import check_fields, check_number
+from vinl.config.limits import check_fields, check_limits
 from vinl.robot.aliengo import PHYSICS_DT
 from vinl.sensing.sensor_config import OdometryConfig, SensorConfig
 from vinl.world.endings import MAX_TILT
@@ -42,19 +42,9 @@ class FaultConfig:
     imu_noise: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, low, high, unit in (
-            ("action_delay", 0.0, 0.5, " s"),
-            ("kp_scale", 0.1, 10.0, ""),
-            ("kd_scale", 0.0, 10.0, ""),
-            ("mass_scale", 0.1, 10.0, ""),
-            ("friction_scale", 0.01, 10.0, ""),
-            ("velocity_noise", 0.0, 10.0, " m/s"),
-            ("velocity_bias", 0.0, 10.0, " m/s"),
-            ("imu_noise", 0.0, 10.0, ""),
-        ):
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise InputError(f"faults.{name} must lie between {low:g} and {high:g}{unit}, got {value:g}")
+        scales = {"kp_scale": 0.1, "kd_scale": 0.0, "mass_scale": 0.1, "friction_scale": 0.01}
+        least = {**scales, "velocity_noise": 0.0, "velocity_bias": 0.0, "imu_noise": 0.0}
+        check_limits(self, "faults.", action_delay=(0.0, 0.5), **{name: (low, 10.0) for name, low in least.items()})
         if abs(self.action_delay / PHYSICS_DT - self.delay_steps) > 1e-6:
             raise InputError(f"faults.action_delay must be a multiple of {PHYSICS_DT:g} s, got {self.action_delay:g}")
 
@@ -138,13 +128,10 @@ class EvaluationConfig:
     faults: FaultConfig = field(default_factory=FaultConfig)
 
     def __post_init__(self) -> None:
-        check_number("time_limit", self.time_limit, 0.02, 3600.0)
-        check_number("max_tilt", self.max_tilt, 0.0, math.pi)
+        check_limits(self, time_limit=(0.02, 3600.0), max_tilt=(0.0, math.pi), ceiling=(1, 100))
         check_fields(
             self,
             counts=("navigation_period",),
             positive=("success_radius", "stuck_window", "min_metres", "max_tilt"),
             unsigned=("min_distance", "clearance", "joint_noise", "stuck_distance"),
         )
-        if self.ceiling is not None and not 1 <= self.ceiling <= 100:
-            raise InputError(f"ceiling must lie between 1 and 100 m, got {self.ceiling}; null for none")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 from vinl.config.errors import InputError
 
@@ -63,3 +64,15 @@ def check_number(name: str, value: float, least: float = 0.0, most: float = math
     """
     if not (math.isfinite(value) and least <= value <= most):
         raise InputError(f"{name} must lie between {least:g} and {most:g}, got {value:g}")
+
+
+def check_limits(config: object, group: str = "", **limits: Range) -> None:
+    """Hold fields of a record, numbers or ranges, to limits from least to most; None is always right.
+
+    Raises:
+        InputError: one leaves them, or is not finite; ``group`` stands before its name.
+    """
+    for name, (least, most) in limits.items():
+        value: Any = getattr(config, name)
+        if value is not None:
+            (check_range if isinstance(value, tuple) else check_number)(f"{group}{name}", value, least, most)

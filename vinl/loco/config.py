@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
 from vinl.config.errors import InputError
-from vinl.config.limits import Range, check_fields, check_number, check_range
+from vinl.config.limits import Range, check_fields, check_limits
 from vinl.gait.config import GaitConfig
 from vinl.loco.student_config import StudentConfig
 from vinl.robot.aliengo import KD, KP
@@ -135,7 +135,7 @@ class RandomisationConfig:
             unsigned=("joint_friction", "velocity_bias", "angular_velocity_bias", *noises),
             fractions=("noise_from",),
         )
-        check_range("randomisation.latency", self.latency, 0.0, MAX_LATENCY)
+        check_limits(self, "randomisation.", latency=(0.0, MAX_LATENCY))
 
     def noise_at(self, fraction: float) -> float:
         """How much of noise, biases and latency there is after a fraction of the training, from 0 to 1."""
@@ -293,5 +293,5 @@ class LocoConfig:
             raise InputError(f"stage {self.stage} does not exist; choose 1, 2 or 3")
         if (self.stage == 3) != (self.student is not None):
             raise InputError(f"stage {self.stage}: the group student belongs to stage 3, and to no other")
-        check_number("num_envs", self.num_envs, 1, 65536)
+        check_limits(self, num_envs=(1, 65536))
         check_fields(self, counts=("iterations",), positive=("episode_length", "kp"), unsigned=("kd",))

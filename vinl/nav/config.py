@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 
 from vinl.config.errors import InputError
-from vinl.config.limits import Range, check_fields, check_number, check_range
+from vinl.config.limits import Range, check_fields, check_limits, check_number
 from vinl.policies.card import PREVIOUS
 from vinl.robot.cameras import NAVIGATION_CAMERA, Camera
 from vinl.sensing.sensor_config import OdometryConfig, SensorConfig
@@ -37,9 +37,8 @@ class RobotConfig:
     period: float = 0.5
 
     def __post_init__(self) -> None:
-        for name in ("length", "width", "max_speed", "max_yaw_rate", "period"):
-            check_number(f"robot.{name}", getattr(self, name), 1e-3, 10.0)
-        check_number("robot.min_speed", self.min_speed, -10.0, 0.0)
+        positive = dict.fromkeys(("length", "width", "max_speed", "max_yaw_rate", "period"), (1e-3, 10.0))
+        check_limits(self, "robot.", **positive, min_speed=(-10.0, 0.0))
         if self.width > self.length:
             raise InputError("robot.width must not exceed robot.length")
 
@@ -70,9 +69,7 @@ class NavCameraConfig:
 
     def __post_init__(self) -> None:
         self.record()
-        check_number("camera.pitch_down", self.pitch_down, -1.5, 1.5)
-        check_number("camera.forward", self.forward, -1.0, 1.0)
-        check_number("camera.mount_height", self.mount_height, 0.05, 2.0)
+        check_limits(self, "camera.", pitch_down=(-1.5, 1.5), forward=(-1.0, 1.0), mount_height=(0.05, 2.0))
 
     def record(self) -> Camera:
         """The camera fixed to the trunk, as policy cards keep it."""
@@ -118,15 +115,11 @@ class MotionConfig:
     with_trunk: bool = True
 
     def __post_init__(self) -> None:
-        for k, axis in enumerate(("roll", "pitch")):
-            check_number(f"motion.tilt ({axis})", self.tilt[k], -1.0, 1.0)
-            check_number(f"motion.offset ({axis})", self.offset[k], 0.0, 1.0)
-            check_number(f"motion.shake ({axis})", self.shake[k], 0.0, 1.0)
-        check_number("motion.uniform", self.uniform, 0.0, 1.0)
-        check_number("motion.correlation", self.correlation, 0.0, 0.999)
-        check_range("motion.amplitude", self.amplitude, 0.0, 10.0)
-        for name in ("height_offset", "height_shake"):
-            check_number(f"motion.{name}", getattr(self, name), 0.0, 0.2)
+        for name, least in (("tilt", -1.0), ("offset", 0.0), ("shake", 0.0)):
+            for axis, value in zip(("roll", "pitch"), getattr(self, name), strict=True):
+                check_number(f"motion.{name} ({axis})", value, least, 1.0)
+        heights = dict.fromkeys(("height_offset", "height_shake"), (0.0, 0.2))
+        check_limits(self, "motion.", uniform=(0, 1), correlation=(0.0, 0.999), amplitude=(0, 10), **heights)
 
 
 @dataclass(frozen=True)
@@ -142,8 +135,7 @@ class ViewConfig:
     ceiling: Range = (2.4, 3.4)
 
     def __post_init__(self) -> None:
-        check_number("view.ceiling_share", self.ceiling_share, 0.0, 1.0)
-        check_range("view.ceiling", self.ceiling, 1.0, 20.0)
+        check_limits(self, "view.", ceiling_share=(0, 1), ceiling=(1, 20))
 
 
 @dataclass(frozen=True)
@@ -174,14 +166,9 @@ class ExecutionConfig:
     give_way: float = 0.0
 
     def __post_init__(self) -> None:
-        check_number("execution.speed_lag", self.speed_lag, 0.0, 5.0)
-        check_number("execution.yaw_lag", self.yaw_lag, 0.0, 5.0)
-        check_range("execution.speed_gain", self.speed_gain, 0.0, 2.0)
-        check_range("execution.yaw_gain", self.yaw_gain, 0.0, 2.0)
-        for name in ("speed_noise", "yaw_noise", "side_slip", "yaw_drift"):
-            check_number(f"execution.{name}", getattr(self, name), 0.0, 1.0)
-        check_range("execution.amplitude", self.amplitude, 0.0, 10.0)
-        check_number("execution.give_way", self.give_way, 0.0, 0.5)
+        unit = dict.fromkeys(("speed_noise", "yaw_noise", "side_slip", "yaw_drift"), (0, 1))
+        lags, gains = dict.fromkeys(("speed_lag", "yaw_lag"), (0, 5)), dict.fromkeys(("speed_gain", "yaw_gain"), (0, 2))
+        check_limits(self, "execution.", **lags, **gains, **unit, amplitude=(0, 10), give_way=(0.0, 0.5))
 
 
 VISIONS, MEMORIES = ("resnet18", "cnn"), ("lstm", "mlp")
@@ -365,9 +352,7 @@ class HomesConfig:
             raise InputError(f"homes.layouts must not sum to more than 1, got {sum(self.layouts.values()):g}")
         if self.plans_share > 0 and not self.plans:
             raise InputError("homes.plans_share is above 0, but homes.plans names no floor plan")
-        check_number("homes.path_radius", self.path_radius, 0.1, 1.0)
-        check_number("homes.start_clearance", self.start_clearance, 0.0, 2.0)
-        check_number("homes.goal_clearance", self.goal_clearance, 0.0, 2.0)
+        check_limits(self, "homes.", path_radius=(0.1, 1.0), start_clearance=(0, 2), goal_clearance=(0, 2))
 
 
 @dataclass(frozen=True)
@@ -389,10 +374,9 @@ class EpisodeConfig:
     start_speed: Range = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        check_number("episodes.success_radius", self.success_radius, 0.01, 5.0)
-        check_number("episodes.success_geodesic", self.success_geodesic, self.success_radius, 50.0)
-        check_range("episodes.distance", self.distance, self.success_radius, 1000.0)
-        check_range("episodes.start_speed", self.start_speed, 0.0, 1.0)
+        radius = self.success_radius
+        check_limits(self, "episodes.", success_radius=(0.01, 5.0), success_geodesic=(radius, 50.0))
+        check_limits(self, "episodes.", distance=(radius, 1000.0), start_speed=(0, 1))
         check_fields(self, "episodes.", counts=("steps",))
 
 
@@ -417,12 +401,8 @@ class ClutterConfig:
     height: Range = (0.1, 0.2)
 
     def __post_init__(self) -> None:
-        check_number("clutter.share", self.share, 0.0, 1.0)
-        check_range("clutter.density", self.density, 0.0, 10.0)
-        check_number("clutter.spacing", self.spacing, 0.0, 10.0)
-        check_range("clutter.length", self.length, 0.01, 2.0)
-        check_number("clutter.width", self.width, 0.01, 2.0)
-        check_range("clutter.height", self.height, 0.01, 0.3)
+        sizes = {"length": (0.01, 2.0), "width": (0.01, 2.0), "height": (0.01, 0.3)}
+        check_limits(self, "clutter.", share=(0, 1), density=(0, 10), spacing=(0, 10), **sizes)
 
 
 @dataclass(frozen=True)
@@ -450,7 +430,7 @@ class NavRewardConfig:
 
     def __post_init__(self) -> None:
         check_fields(self, "reward.", positive=("scale",))
-        check_number("reward.margin", self.margin, 0.0, 0.15)
+        check_limits(self, "reward.", margin=(0.0, 0.15))
 
 
 @dataclass(frozen=True)
@@ -489,8 +469,7 @@ class NavConfig:
 
     def __post_init__(self) -> None:
         check_fields(self, counts=("iterations",))
-        check_number("num_envs", self.num_envs, 1, 65536)
-        check_number("seed", self.seed, 0, 2**31 - 1)
+        check_limits(self, num_envs=(1, 65536), seed=(0, 2**31 - 1))
         if self.previous not in PREVIOUS:
             raise InputError(f"previous must be one of {', '.join(PREVIOUS)}, got {self.previous!r}")
         if self.camera is not None and self.camera.missing == "plane" and self.ppo.image_type == "uint8":

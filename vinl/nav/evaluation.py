@@ -19,7 +19,7 @@ from vinl.chain.navigators.base import ORACLE, Task
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.chain.records import RouteRecord
 from vinl.config.errors import InputError
-from vinl.config.limits import check_fields, check_number
+from vinl.config.limits import check_fields, check_limits
 from vinl.config.loader import build_config, load_config
 from vinl.nav.config import EpisodeConfig, NavCameraConfig, NavConfig
 from vinl.nav.environment import EpisodeEnd, NavEnvironment
@@ -255,11 +255,9 @@ class NavEvaluation:
     start_clearance: float = 0.45
 
     def __post_init__(self) -> None:
-        check_number("--episodes", self.episodes, 1, 65536)
-        check_number("--seed", self.seed, 0, 2**31 - 1)
+        check_limits(self, "--", episodes=(1, 65536), seed=(0, 2**31 - 1), drift=(0.0, 0.5))
         if self.motion not in MOTIONS:
             raise InputError(f"--motion must be one of {', '.join(MOTIONS)}, got {self.motion!r}")
-        check_number("--drift", self.drift, 0.0, 0.5)
         check_fields(self, "--", counts=("steps",), fractions=("clutter",))
 
 
