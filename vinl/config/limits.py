@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 from vinl.config.errors import InputError
 
@@ -73,6 +72,8 @@ def check_limits(config: object, group: str = "", **limits: Range) -> None:
         InputError: one leaves them, or is not finite; ``group`` stands before its name.
     """
     for name, (least, most) in limits.items():
-        value: Any = getattr(config, name)
-        if value is not None:
-            (check_range if isinstance(value, tuple) else check_number)(f"{group}{name}", value, least, most)
+        value = getattr(config, name)
+        if isinstance(value, tuple):
+            check_range(f"{group}{name}", value, least, most)
+        elif value is not None:
+            check_number(f"{group}{name}", value, least, most)
