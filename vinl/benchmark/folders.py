@@ -197,7 +197,6 @@ def read_results(folder: Path, about: dict[str, Any], out: Path) -> Results:
     """One row as it was walked.
 
     Args:
-        folder: that it lies in.
         about: what its ``run.json`` says.
         out: where films may lie.
 

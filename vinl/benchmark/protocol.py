@@ -65,7 +65,6 @@ def place_route(
     """A start/goal pair in a floor plan, with its distances.
 
     Args:
-        space: of the plan.
         start, goal: x, y [m].
         source: names the pair in errors.
 
@@ -153,7 +152,6 @@ class Protocol:
         plans: where they walk; names differ, see ``name_apart``.
         episodes: start/goal pairs a plan; the same for all seeds.
         seeds: repetitions; a seed changes clutter, heading and joint angles at the start.
-        config: limits and rules.
         films: which episodes are filmed: none, the first of every plan, or all of the first seed.
         record: keep the poses of all episodes in files, see ``recordings``.
         routes: start/goal pairs of one's own for every plan, ``episodes`` each, see ``routes``; None: they are drawn.
@@ -309,9 +307,7 @@ def missing_films(wanted: Sequence[Key], films: str, seed: int, folder: Path | N
     """The episodes to film: ``first`` of every plan, or ``all`` of the first seed, without those filmed before.
 
     Args:
-        wanted: the episodes of the row.
         films: ``none``, ``first`` or ``all``.
-        seed: the first one.
         folder: where films may already lie; None: none does.
     """
     if films == "none":

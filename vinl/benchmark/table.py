@@ -51,7 +51,6 @@ class RowConfig:
         title: what the report calls it.
         loco: locomotor: a shipped policy's name, or a policy folder.
         nav: navigator: oracle, a shipped navigation policy's name, or a policy folder.
-        obstacles: clutter preset.
         recovery: free robots of the learned navigator where they are stuck.
         paper: what the paper found; none for a row that it does not have.
     """
@@ -168,9 +167,6 @@ class TableRow:
     """A row that was walked.
 
     Attributes:
-        name: of its folder.
-        title: for people.
-        results: what came out.
         paper: what the paper found, if it has the row.
         command: that walked it, if it is another than the table's.
     """

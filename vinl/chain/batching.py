@@ -35,7 +35,6 @@ class BatchedPolicy:
         policy: its network is called directly; the policy's own memory stays untouched.
 
     Attributes:
-        card, camera: the policy's.
         rows: numbers of the robots that are asked for, see ``ask_only``; None: all.
     """
 
@@ -177,7 +176,6 @@ def split_calls(count: int, sizes: Sequence[int]) -> list[tuple[int, int]]:
     """Calls that ``count`` robots are asked for in: for each, how many they are and to how many they are filled up.
 
     Args:
-        count: robots.
         sizes: those that a call may have, ascending.
     """
     full, rest = divmod(count, sizes[-1])

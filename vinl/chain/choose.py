@@ -136,8 +136,6 @@ def load_navigator(
 
     Args:
         name: ``"oracle"``, a shipped navigation policy's name, a policy folder or the folder of a training run.
-        config: how the oracle walks.
-        device: of a trained navigator.
         recovery: free its robots where they are stuck (``RecoveringNavigator``); the oracle never has that.
 
     Raises:

@@ -29,12 +29,10 @@ class LocomotionController:
     that is planned on the map; one with a camera gets depth.
 
     Args:
-        policy: the locomotion policy.
         cameras: renders depth; needed only by a policy with a camera.
         gait: plans the gait whose rows the policy observes; None: it observes none.
 
     Attributes:
-        policy: as given.
         actions: (n, 12) the last ones; none before the first ``reset``.
     """
 

@@ -31,7 +31,6 @@ class DepthCameras:
     Args:
         meshes: the worlds, vertices (v, 3) [m] and faces (f, 3).
         worlds: (n,) the world that each robot is in.
-        camera: what each of them carries.
         floor: height of a level floor that the meshes leave out [m]; None: they have it.
     """
 
@@ -87,9 +86,7 @@ def open_depth_cameras(
     """The cameras of robots in their homes: walls, furniture, floor and the clutter of each episode.
 
     Args:
-        plan: the floor plan.
         blocks: the clutter, one for each robot. Robots without any share one mesh.
-        camera: what each robot carries.
         ceiling: height of a ceiling [m]; none by default.
     """
     first_bare = next((k for k, some in enumerate(blocks) if not len(some)), 0)
@@ -117,7 +114,6 @@ class CameraErrors:
     """What all cameras of n robots share: the poses of the last moments, and the keys of their random numbers.
 
     Args:
-        config: errors of each camera.
         keys: (n,) of the episodes; the same key gives the same errors whichever others are run with it.
     """
 
@@ -148,13 +144,8 @@ class RealCameras:
     """What ``DepthCameras`` see, as real cameras give it.
 
     Args:
-        cameras: the ideal cameras.
-        config: their errors.
         keys: (n,) that the random numbers follow from.
         errors: notes where the robots were.
-
-    Attributes:
-        camera: the record of the ideal camera.
     """
 
     def __init__(self, cameras: DepthCameras, config: SensorConfig, keys: np.ndarray, errors: CameraErrors) -> None:

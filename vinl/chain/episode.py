@@ -37,11 +37,8 @@ class EpisodeSetup:
     Attributes:
         plan: name of the floor plan.
         episode: number of the start/goal pair in the plan.
-        seed: which repetition.
-        route: start, goal and distances.
         yaw: heading at the start [rad].
         joints: (12,) joint angles at the start [rad].
-        blocks: the clutter of this episode.
     """
 
     plan: str

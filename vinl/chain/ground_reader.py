@@ -40,15 +40,7 @@ def raise_blocks(bare: HeightField, blocks: Sequence[Blocks]) -> list[HeightFiel
 
 
 class Stack:
-    """Grids of n robots, or one for all, as one grid along y.
-
-    Args:
-        frame: of each.
-        count: of grids.
-
-    Attributes:
-        frame: of all together.
-    """
+    """Grids of n robots, or one for all, as one grid along y."""
 
     def __init__(self, frame: GridFrame, count: int) -> None:
         rows, columns = frame.shape
@@ -67,10 +59,6 @@ class ScanReader:
     hangs above the robot leaves the floor free.
 
     Level ground lies around them, as wide as robots look from where they are: none reads a neighbour's grid.
-
-    Args:
-        plan: where they are.
-        blocks: of each robot.
     """
 
     def __init__(self, plan: FloorPlan, blocks: Sequence[Blocks]) -> None:
@@ -96,7 +84,6 @@ class GaitMaps:
 
     Args:
         maps: one for each robot, or one for all, all on the same frame.
-        frame: of each.
     """
 
     def __init__(self, maps: Sequence[GroundMap], frame: GridFrame) -> None:
@@ -125,10 +112,6 @@ def map_ground(heights: Float[np.ndarray, "rows columns"], frame: GridFrame, box
 
 class GaitReader:
     """Keeps the gaits of n robots, one control step after the other.
-
-    Args:
-        config: of the gait, from the policy's card.
-        maps: what they walk on.
 
     Attributes:
         gait: of all robots, as of the last ``read``; None before the first.

@@ -130,8 +130,6 @@ def find_cause(
         at: where the episode ended [m].
         touches: as in ``EpisodeTrace.contacts``.
         since: time from which touches count [s].
-        space: of the floor plan.
-        blocks: the clutter.
     """
     late = touches[touches[:, 0] > since + 1e-9]
     on_block = np.array([name.endswith(BLOCK) for name in KINDS])[late[:, 1].astype(int)]

@@ -111,7 +111,6 @@ class Robot:
     """A robot and what it touches. ``qpos`` and ``qvel`` are views of its state.
 
     Args:
-        model: the world.
         late: joint targets reach the motors so many physics steps late.
     """
 
@@ -215,7 +214,6 @@ class FaultyState:
     """What n robots know of their velocity and attitude in place of what is. Every robot has random numbers of its own.
 
     Args:
-        faults: what is wrong.
         rngs: the only sources of chance, one for each robot.
     """
 
@@ -228,12 +226,7 @@ class FaultyState:
     def measure(
         self, qpos: Float[np.ndarray, "n 19"], qvel: Float[np.ndarray, "n 18"], rows: Sequence[int]
     ) -> tuple[Float[np.ndarray, "n 19"], Float[np.ndarray, "n 18"]]:
-        """Position and velocity as the robots know them, as new arrays. To be called once in every control step.
-
-        Args:
-            qpos, qvel: as they are.
-            rows: the robots that still walk.
-        """
+        """Position and velocity as the robots know them, as new arrays. To be called once in every control step."""
         faults, qpos, qvel = self._faults, qpos.copy(), qvel.copy()
         keep = math.exp(-CONTROL_DT / BIAS_TIME)
         for k in rows:

@@ -45,11 +45,8 @@ def run_episodes(
     same others. Images are rendered for the living alone; the others keep their last one.
 
     Args:
-        plan: the floor plan.
-        setups: the episodes.
         locomotor: see ``LocomotionController``.
         navigator: see ``Navigator``.
-        config: limits of an episode.
         filmed: rows whose poses are kept.
         on_end: called with each episode that ended, in the order in which they end.
         is_stopped: asked before each decision of the navigator.

@@ -44,8 +44,6 @@ def scene_spec(
     tell whether anything was touched for 1 us a step; only then are the contacts looked at in Python.
 
     Args:
-        walls: walls and furniture.
-        blocks: the clutter.
         ground: a height field to stand on; a plane at z = 0 by default.
         kp: position gain of the joints [N m / rad].
         kd: velocity gain of the joints [N m s / rad].

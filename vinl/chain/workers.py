@@ -51,7 +51,6 @@ class WorkerPool:
     Torch uses one thread everywhere, so that sums are added in the same order in any process.
 
     Args:
-        workers: number of processes.
         shared: handed to every job; unpickled once a process.
     """
 

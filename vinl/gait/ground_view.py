@@ -53,7 +53,6 @@ def build_ground_map(heights: Float[np.ndarray, "rows columns"], frame: GridFram
 
     Args:
         heights: of ground and blocks, without walls [m].
-        frame: of the grid.
         boxes: everything that feet must stay off: blocks, walls, furniture.
     """
     distance, top = block_distances(frame, boxes)
@@ -69,8 +68,6 @@ class FieldView:
 
     Args:
         xp: ``numpy`` or ``jax.numpy``.
-        ground: the grids.
-        frame: of the grids.
         qpos: (n, >= 7) position [m] and quaternion of the trunks.
     """
 

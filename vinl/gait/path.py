@@ -54,7 +54,6 @@ def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: f
 
     Args:
         xp: ``numpy``, ``jax.numpy`` or ``torch``.
-        config, gait: of the robots.
         feet: (n, 4, 3) middles of the feet in the heading frame [m]; a foot that stands should be where it is.
         later: how far ahead on the path to look [s]; past its touch-down a foot is at its foothold, and one that has
             lifted off by then is on its way there from where it stands.

@@ -34,7 +34,6 @@ def choose_cameras(chosen: Cameras | None, joints: bool, navigation: Camera | No
     Args:
         chosen: records, or the names ``"navigation"`` and ``"locomotion"``; None: one image ``depth``, of the
             locomotion camera for an agent of joints, else of the navigation camera.
-        joints: what the agent moves.
         navigation: the navigator's camera, None if its config is blind.
 
     Raises:
@@ -62,9 +61,6 @@ class AgentObservation:
         cameras: by the name of their images.
         height_scan: whether it also reads the height of the ground.
         steps: numbers that it knows of its last step.
-
-    Attributes:
-        space: of the observations.
     """
 
     def __init__(self, joints: bool, cameras: Mapping[str, Camera], height_scan: bool, steps: int) -> None:
@@ -99,7 +95,6 @@ class AgentObservation:
         """The observation of this moment.
 
         Args:
-            trip: where the robot is.
             command: velocities that it shall have.
             previous: the last step; of an agent of joints its action in the locomotor's units.
         """

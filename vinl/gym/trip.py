@@ -33,16 +33,11 @@ class Trip:
     """The robot of an episode on its way, counted as ``evaluate`` counts it.
 
     Args:
-        space: the free floor of the plan.
-        setup: start, goal and clutter.
-        rules: limits of the episode.
         kp: position gain of the joints [N m / rad].
         kd: velocity gain of the joints [N m s / rad].
 
     Attributes:
         task: free floor and route, what an oracle may know.
-        setup: start, goal and clutter.
-        robot: the robot.
         steps: control steps of 0.02 s made.
         foot_steps: those in which a foot was on a block, a wall or furniture.
         touched_wall: whether the last control step touched a wall or furniture with any part.
@@ -94,7 +89,6 @@ class Trip:
         """One control step towards joint targets [rad].
 
         Args:
-            target: of the joints.
             command: velocities that the robot was to have, for the errors in the record.
         """
         self._recorder.note_pose(self.steps, self.robot.qpos, command[0])
@@ -132,7 +126,6 @@ class ChaseView:
     """The robot of an episode from behind and above.
 
     Args:
-        trip: the episode.
         period: time between two pictures [s].
     """
 

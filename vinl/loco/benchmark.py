@@ -18,7 +18,6 @@ def run_loco(num_envs: int = 4096, seconds: float = 10.0, config: LocoConfig | N
     """Step the stage-1 environment with random actions on JAX's default device.
 
     Args:
-        num_envs: robots in parallel.
         seconds: of measuring, after compilation and a warm-up.
         config: defaults to ``loco/rough``.
 

@@ -23,8 +23,6 @@ def next_levels(
     """The levels after an episode.
 
     Args:
-        config: the thresholds.
-        levels: how many levels there are.
         level: (n,) now.
         timeout, fallen: (n,) how the episode ended; robots with neither keep their level.
         way: (n,) progress along the command [m].

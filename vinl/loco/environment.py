@@ -67,7 +67,6 @@ class StepResult(NamedTuple):
     """What a step gives to the learner.
 
     Attributes:
-        observations: after the step.
         reward: (n,); done: (n,) 1 where fallen or out of time; timeout: (n,) 1 where out of time.
     """
 
@@ -93,13 +92,10 @@ class LocoEnvironment:
     """Robots that learn to follow velocity commands.
 
     Args:
-        config: the training's configuration.
         seed: of commands, starts, noise, randomisation; defaults to the configuration's.
 
     Attributes:
-        terrain: the ground with its tiles.
         state: of all robots; ``step`` replaces it.
-        num_envs: number of robots.
     """
 
     def __init__(self, config: LocoConfig, seed: int | None = None) -> None:
@@ -146,7 +142,6 @@ class LocoEnvironment:
         """One control step; robots whose episode ends start anew at once. The old state is given up.
 
         Args:
-            action: of the robots.
             gait: that the robots follow, in place of the environment's own: a student keeps one by what it believes,
                 and plans for it. None: the environment's, which in stage 3 plans nothing.
         """

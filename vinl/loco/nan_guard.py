@@ -81,9 +81,7 @@ def keep_lost(
     """Add the robots of a step that went wrong.
 
     Args:
-        lost: those before.
         wrong: what went wrong with whom, in the order of ``REASONS``.
-        state: before the step.
         action: of the step, as the policy gave it.
         targets, delay: of the step, as ``Simulation.step`` was given them.
     """

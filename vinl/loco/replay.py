@@ -39,7 +39,6 @@ class LostState:
     Attributes:
         values: the fields of ``nan_guard.Lost`` of one robot, by name.
         reason: what went wrong in the training, a word of ``nan_guard.REASONS``.
-        config: of the training.
     """
 
     values: dict[str, Any]
@@ -63,7 +62,6 @@ class Replay:
     Attributes:
         qpos: (t, 19), qvel: (t, 18), acceleration: (t, 18), torque: (t, 12).
         wrong: what went wrong first, in words, and in which row; None: nothing.
-        field: the ground.
     """
 
     qpos: Float[np.ndarray, "t 19"]

@@ -41,7 +41,6 @@ class Motion(NamedTuple):
         command: (n, 3) forward, left [m/s], yaw rate [rad/s].
         contacts: latched over the control step.
         landed: (n, 4) feet that touch down in this step.
-        steps: how the feet kept to the gait.
         fallen: (n,).
     """
 
@@ -67,10 +66,6 @@ def distance2(path_error: Float[Array, "n 4 3"]) -> Float[Array, "n 4"]:
 
 def reward_terms(m: Motion, sigma: Array | float) -> dict[str, Float[Array, " n"]]:
     """Every term by its name in ``RewardConfig`` [ViNL code, section 2 of its rewards].
-
-    Args:
-        m: the motion of the last control step.
-        sigma: width of the tracking terms.
 
     Returns:
         Term name to (n,) values; ``fall`` is divided by the control step, so that its weight is per fall.

@@ -79,7 +79,6 @@ class DeviceGround(NamedTuple):
         near: (rows * columns,) bit 1: a block lies near; bit 2: a wall lies near.
         distance, top: (rows * columns,) distance from the nearest block and its height [m]; one number where the ground
             has no blocks.
-        map: what footholds are chosen on.
         solid: whether the blocks collide.
     """
 
@@ -143,8 +142,6 @@ class Simulation:
 
     Attributes:
         ground: the arrays that ``step`` needs; ``set_solid`` changes whether its blocks collide.
-        frame: where the cells of the ground lie.
-        model: the MuJoCo model.
     """
 
     def __init__(
@@ -252,10 +249,8 @@ class Simulation:
 
         Args:
             ground: ``self.ground``.
-            body: state of the robots.
             targets: joint targets of this control step and of those before it, the newest first [rad].
             delay: physics steps until a target takes effect, at most ``SUBSTEPS`` * (``PAST`` - 1).
-            traits: what the robots are like.
 
         Returns:
             The new state, the latched contacts and the torques of the last substep [N m].
@@ -338,7 +333,6 @@ def target_age(substep: Array, delay: Array) -> Array:
     """How many control steps old the joint target is that acts in a physics step.
 
     Args:
-        substep: of the control step.
         delay: physics steps until a target takes effect.
     """
     return jnp.clip((delay - substep + SUBSTEPS - 1) // SUBSTEPS, 0, PAST - 1)

@@ -88,7 +88,6 @@ def start_body(
     """Robots near the middle of their tiles, any heading, joints and velocities a little off.
 
     Args:
-        randomisation: how far off.
         starts: middles of the tiles and the ground's height there [m].
         level, column: tile of each robot.
         key: random state.
@@ -135,7 +134,6 @@ def first_state(config: LocoConfig, starts: Float[Array, "levels columns 3"], ke
     """All robots at the start of a training, each a random while into its episode.
 
     Args:
-        config: of the training.
         starts: as for ``start_body``.
         key: random state.
     """

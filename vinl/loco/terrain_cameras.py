@@ -29,12 +29,7 @@ class TerrainCameras:
     Everything random follows from the seed and the count of images, so that a resumed training sees the same.
 
     Args:
-        mesh: of the world that all robots share.
-        camera: the record.
         config: errors of the cameras, drawn anew for every episode.
-        n: robots.
-        device: torch device.
-        seed: of everything random.
     """
 
     def __init__(self, mesh: Mesh, camera: Camera, config: SensorConfig, n: int, device: str, seed: int) -> None:

@@ -93,7 +93,6 @@ def train_locomotor(
 
     Args:
         config: of a new run; None resumes the run in ``folder``.
-        folder: of the run.
         device: ``"cpu"`` or ``"cuda"``.
         save_every: seconds between checkpoints.
         iterations: updates in all; defaults to the configuration's.

@@ -30,7 +30,6 @@ class LocoVecEnv(VecEnv):
     (the same exactly, then what only the critic knows).
 
     Args:
-        environment: the robots.
         device: torch device; JAX must run on the same kind.
 
     Attributes:
@@ -140,8 +139,6 @@ class CameraVecEnv(LocoVecEnv):
     ``heights`` and ``velocity``, see ``environment.Observations``.
 
     Args:
-        environment: the robots.
-        cameras: their depth cameras.
         device: torch device; JAX must run on the same kind.
         stopwatch: times ``simulate`` and ``render``.
     """

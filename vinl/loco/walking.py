@@ -75,11 +75,6 @@ def go_on(
     """One control step of the gait, planned on the exact map and with the exact velocity.
 
     Args:
-        config: of the gait.
-        ground, frame: the map and where its cells lie.
-        gait: before the step.
-        before, body: the robots before and after the step.
-        command: that they have.
         planned: False: the clock runs on, but whoever gave ``gait`` plans its footholds.
     """
     feet, velocity = feet_in_heading_frame(jnp, body.qpos), velocity_in_heading_frame(jnp, body.qpos, body.qvel)

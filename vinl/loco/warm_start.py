@@ -23,9 +23,7 @@ class Origin:
     """Where the networks of a training come from: this goes onto the card of the new policy.
 
     Attributes:
-        policy: name on the card of the old policy.
         samples: that it had learned from.
-        commit: of the code that trained it.
         weights: SHA-256 of its actor's weights.
         critic: whether the critic was taken over too.
         lineage: every training behind it, see ``policies.lineage``.
@@ -63,7 +61,6 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
 
     Args:
         name_or_path: ``"rough"``, ``"vinl/rough"``, a policy folder or the folder of a training run.
-        config: of the training that shall start from them.
 
     Raises:
         InputError: no such policy, one of another kind, of other sizes, with another gait or with other joint gains.
@@ -89,7 +86,6 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[StepActor, Orig
 
     Args:
         name_or_path: as for ``load_warm_start``.
-        config: of the student's training.
 
     Raises:
         InputError: no such policy, one that is no ``StepActor``, one with another gait, or one with other joint

@@ -102,11 +102,7 @@ _OF_STEPS = ("reward", "blocked", "near", "step_length")
 
 
 class Measures:
-    """Sums since they were last read.
-
-    Args:
-        device: that they are kept on.
-    """
+    """Sums since they were last read."""
 
     def __init__(self, device: torch.device) -> None:
         self._ended = torch.zeros(len(_NAMES), dtype=torch.float64, device=device)
@@ -177,13 +173,10 @@ class NavEnvironment:
     Nothing in ``step`` waits for the device. The same seed, configuration and homes give the same episodes.
 
     Args:
-        config: of the environment.
-        homes: that the robots drive in.
         device: ``"cpu"``, ``"cuda"`` or ``"cuda:1"``, the homes' too.
         seed: of everything random but the homes; that of the configuration by default.
 
     Attributes:
-        num_envs: robots.
         camera: its record, or None if the robots are blind.
         ended: figures of the episodes that ended in the last step, see ``EpisodeEnd``; None before the first.
         state: the robots' tensors by name, see ``kernels.Robots``; to be read.

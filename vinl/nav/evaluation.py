@@ -67,8 +67,6 @@ class KindResults:
     """All episodes in one kind of home.
 
     Attributes:
-        kind: of home.
-        homes: their names.
         dropped: homes that no episode could be made in.
         reasons: why not, of each.
         left_out: robots that no start within the range of distances was found for, or no path; they are in no figure.
@@ -98,8 +96,6 @@ def evaluate_kind(
 
     Args:
         policy: the navigator; None: the oracle.
-        kind: name of the kind of homes.
-        homes: to drive in.
         config: as ``evaluation.describe_episodes`` returns it.
         progress: called with steps done and steps at most.
     """
@@ -292,7 +288,6 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
 
     Args:
         card: of the navigator; None: blind (the oracle).
-        rules: of the evaluation.
 
     Raises:
         InputError: the card's velocities are none that the environment knows.
@@ -358,11 +353,9 @@ def build_homes(
     """Homes by kind.
 
     Args:
-        config: of the environment.
         count: generated homes; 0: none.
         homes_seed: of the first one; training starts from seed 1, so choose one far above its number of homes.
         plans: floor plans, see ``vinl.world.readers.expand_paths``.
-        device: for the homes.
         progress: called with homes done and wanted, of each kind anew.
         sets: names of ``vinl.world.homes.generate.JUDGING_SETS``.
 

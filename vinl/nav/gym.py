@@ -48,12 +48,10 @@ def draw_robot(
     """Draw a home from above and the depth image beside it.
 
     Args:
-        home: what stands where.
         path: places so far [m], the last one is the robot's.
         yaw: heading [rad].
         goal: [m].
         depth: in [0, 1], near is dark; None or empty: the plan alone.
-        robot: its footprint.
     """
     solid = home.solid[home.solid[:, 5] < _LINTEL].astype(np.float64)
     corners = Boxes(solid).corners()
@@ -108,9 +106,6 @@ class NavVectorEnv(VectorEnv):
         plans: floor plans (files or names) instead of generated homes.
         device: ``"cpu"`` or ``"cuda"``; observations and actions are numpy arrays all the same.
         overrides: settings of the config as ``key=value``.
-
-    Attributes:
-        environment: the robots themselves.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012 - gymnasium's own
@@ -157,9 +152,6 @@ class NavEnv(gymnasium.Env):
         render_mode: ``"rgb_array"`` or None.
         config, homes, plans, device, overrides: as for ``NavVectorEnv``.
         store: homes that are there already, in the place of ``homes`` and ``plans``.
-
-    Attributes:
-        environment: the robot itself.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012 - gymnasium's own

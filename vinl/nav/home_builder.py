@@ -45,9 +45,6 @@ class HomeRecord:
     """What the host remembers of a home.
 
     Attributes:
-        seed: that it was drawn from.
-        name: of the floor plan.
-        frame: of the floor plan's grid.
         floor: its free cells, eight in a byte.
         solid: (n, 7) boxes of walls and furniture.
         blocks: (m, 6) rows of the clutter.
@@ -152,8 +149,6 @@ def prepare_home(plan: FloorPlan, seed: int, config: NavConfig) -> BuiltHome | s
 
     Args:
         plan: the floor plan, on a grid of 5 cm.
-        seed: of goals, starts and clutter.
-        config: of the environment.
 
     Returns:
         The home, or why it cannot be used.

@@ -41,12 +41,6 @@ class HomeStore:
         tree: how Warp builds the ray trees of the meshes: ``"sah"`` (on the host), ``"lbvh"`` (on a GPU); Warp
             chooses by default.
 
-    Attributes:
-        records: of every home.
-        homes: the grids on the device, for the kernels.
-        device: torch device.
-        reasons: as given.
-
     Raises:
         InputError: there is no home, or no such device; the homes are too large together, or differ in their number of
             goals or starts.
@@ -104,10 +98,7 @@ class HomeStore:
         """The homes that a configuration asks for, built by several processes.
 
         Args:
-            config: of the environment.
-            device: for the homes.
             progress: called with the homes built so far and how many there will be.
-            tree: as for the class.
 
         Raises:
             InputError: hardly any home has a path of the length asked for.
@@ -139,7 +130,6 @@ class HomeStore:
         Args:
             plans: on grids of 5 cm.
             config: of the environment; its generator is not used.
-            device: for the homes.
 
         Raises:
             InputError: none of the plans can be used; the message says why not.
@@ -161,7 +151,6 @@ class HomeStore:
         Args:
             paths: see ``vinl.world.readers.expand_paths``.
             config: of the environment; its generator is not used.
-            device: for the homes.
             progress: called with the plans read so far and how many there are.
 
         Raises:

@@ -139,12 +139,10 @@ class RecurrentStorage:
     """Buffers that are written during the roll-out and never reallocated.
 
     Args:
-        steps, robots: t and n.
         image: (height, width) of the images, or None.
         image_type: one of ``config.IMAGE_TYPES``.
         vector, actions, hidden: sizes; ``hidden`` 0: there is none.
         state: of the robots at the start; its shapes are taken.
-        device: where the buffers lie.
     """
 
     def __init__(

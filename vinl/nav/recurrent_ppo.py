@@ -35,11 +35,7 @@ class RecurrentPPO:
     and ``hidden`` (n, g) if the feature is to tell it.
 
     Args:
-        model: actor and critic, on the device.
-        storage: the roll-out's buffers.
-        rate: the learning rate.
         config: of the algorithm; the learning rate is ``rate``'s.
-        peers: the other processes of the training.
     """
 
     def __init__(

@@ -44,9 +44,7 @@ class NavTrainingEnv:
     """Actions go in held to their range, observations come out as rsl-rl has them.
 
     Args:
-        environment: the robots of this process.
         places: whether observations hold where the robot has been lately, for the network to guess.
-        peers: the processes of the training.
     """
 
     def __init__(self, environment: NavEnvironment, places: bool = False, peers: Peers | None = None) -> None:
@@ -100,7 +98,6 @@ def train_navigator(
 
     Args:
         config: of a new run; None resumes the run in ``folder``.
-        folder: of the run.
         device: ``"cpu"`` or ``"cuda"``.
         save_every: seconds between checkpoints.
         iterations: updates in all; defaults to the configuration's.
@@ -254,9 +251,6 @@ def build_algorithm(
     """Network, buffers and PPO as the configuration says.
 
     Args:
-        config: of the training.
-        device: torch device.
-        peers: the processes of the training.
         weights: of the actor; default: fresh ones.
     """
     p = config.ppo

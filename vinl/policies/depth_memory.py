@@ -28,7 +28,6 @@ class DepthMemory(nn.Module):
         vector: numbers beside the image.
         visual: numbers that the image becomes.
         hidden: width of the memory and size of the feature.
-        layers: of the memory.
         memory: ``"lstm"``, or ``"mlp"``: as many ReLU layers of the same width, which remember nothing [paper IV-B].
         planes: channels of the ResNet's first stage.
         channels: of the images: 1, or 2 with one for the pixels that are marked as lost.
@@ -98,7 +97,6 @@ class DepthMemory(nn.Module):
         Args:
             depth: (t, n, H, W) in [0, 1]; not looked at when blind.
             vector: (t, n, k).
-            state: before the first step.
             fresh: (t, n) an episode begins with this step: its state is zeroed before it.
 
         Returns:

@@ -54,7 +54,6 @@ class DepthPolicy:
     It remembers the past of n robots. Rows keep their robot from call to call; ``reset`` says who starts anew.
 
     Attributes:
-        card: the policy's card.
         camera: the camera that it was trained with, rebuilt from the card; None if it is blind.
     """
 

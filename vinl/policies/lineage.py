@@ -20,7 +20,6 @@ def trace_lineage(card: PolicyCard, weights: Mapping[str, Tensor]) -> list[dict[
     """The trainings behind a policy, the first one first, for the card of a training that starts from it.
 
     Args:
-        card: of the policy.
         weights: by name, as they were loaded.
 
     Returns:

@@ -30,7 +30,6 @@ class NavActor(PolicyNetwork):
         height, width: of the depth image [pixels].
         visual: numbers that the image becomes.
         embedding: numbers that goal and previous action become, each.
-        hidden, layers: of the memory.
         memory: ``"lstm"`` or ``"mlp"``.
         planes: channels of the ResNet's first stage.
         previous: numbers on the last step: 2 of the action or the motion, 4 of both.
@@ -93,7 +92,6 @@ class NavActor(PolicyNetwork):
             depth: (t, n, H, W) in [0, 1]; not looked at when blind.
             vector: (t, n, k): distance to the goal / 5 m, cosine and sine of its bearing, previous action or motion or
                 both.
-            state: before the first step.
             fresh: (t, n) an episode begins with this step: its state is zeroed before it.
 
         Returns:

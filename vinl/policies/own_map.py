@@ -77,11 +77,9 @@ def update_map(
     """The maps after a step.
 
     Args:
-        state: before.
         motion: of the step that led here, in units of the action; of a fresh episode it is not read.
         depth: in [0, 1], what is not above 0 did not return; None: blind.
         fresh: an episode begins: its map is blank.
-        geometry: units.
 
     Returns:
         What the network sees, (n, ``MAP_SIZE``): around the robot, in its heading frame, where it has been and what is

@@ -61,7 +61,6 @@ class SteppingActor(PolicyNetwork):
 
     Attributes:
         image: height and width that it takes [pixels]; None: it is blind, and takes the ground for level.
-        gait: of the teacher.
         remembers: whether it remembers; one that does not maps each image by itself [paper IV-B].
     """
 
@@ -233,7 +232,6 @@ class SteppingActor(PolicyNetwork):
         Args:
             depth: (t, n, H, W) in [0, 1], negative where nothing returned: prepared by the camera record of the card.
             vector: (t, n, 45) scaled ``SENSED_TABLE``.
-            state: before the first step.
             fresh: (t, n) an episode begins with this step.
 
         Returns:

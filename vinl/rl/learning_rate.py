@@ -13,11 +13,8 @@ class DeviceRate:
     than half of it [rsl-rl], within limits.
 
     Args:
-        start: first rate.
         low, high: limits.
         desired_kl: divergence to keep to; None: the rate stays, within the limits.
-        down, up: factors.
-        device: of the networks.
 
     Attributes:
         value: () the rate; hand it to the optimiser.

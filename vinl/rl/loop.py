@@ -36,7 +36,6 @@ class TrainingProgress:
 
     Args:
         total: iterations of the whole run, or its seconds.
-        done: of them before.
         unit: what is counted.
     """
 
@@ -105,17 +104,11 @@ class TrainingLoop:
         env: rsl-rl's ``VecEnv``, with ``read_measures`` (means since the last call), ``save_state`` and ``load_state``.
         algorithm: the learner.
         steps: control steps of each robot between updates.
-        folder: of the run.
-        device: torch device.
         export: called after every checkpoint with the policy and the samples so far; writes the policy.
         figures: picks what the progress bar shows from an iteration's measures.
         schedule: called before every iteration with the algorithm and the fraction of the training that is done.
         save_every: seconds between checkpoints.
         stopwatch: whose parts go into the curves where it ran.
-
-    Attributes:
-        current_learning_iteration: updates done.
-        samples: environment steps done.
     """
 
     def __init__(
@@ -183,7 +176,6 @@ class TrainingLoop:
         """Go on until ``iterations`` are done in all, time is up or an interrupt asks to stop; all of them save.
 
         Args:
-            iterations: updates in all.
             minutes: from now on, after which the training is over too; settings then move with whichever is further.
 
         Returns:

@@ -37,9 +37,6 @@ _SIGNS = ("out of memory", "resource_exhausted", "failed to allocate", "cannot a
 def explain_out_of_memory(num_envs: int) -> Iterator[None]:
     """Turn the libraries' errors about full memory into one that says what to do.
 
-    Args:
-        num_envs: robots of the training.
-
     Raises:
         InputError: memory is full.
     """

@@ -27,8 +27,6 @@ def judge_losses(
         env: asked for their states (``take_lost``, if it keeps them) where ``measures`` has ``not_finite`` above zero;
             else nothing waits for the device.
         measures: of the iteration.
-        robot_steps: of the iteration.
-        iteration: its number.
         folder: the states go into its folder ``not_finite``.
 
     Returns:

@@ -23,7 +23,6 @@ class Peers:
     """The processes of one training; a single one needs no communication.
 
     Attributes:
-        rank: number of this process.
         count: how many there are.
     """
 
@@ -104,7 +103,6 @@ class PeerLoop(TrainingLoop):
     """``TrainingLoop`` for the processes of one training.
 
     Args:
-        peers: of this training.
         arguments: as for ``TrainingLoop``; ``folder`` is what ``peer_folder`` returns.
         profile: write where the time of one iteration goes to ``profile.txt`` in the folder.
     """
@@ -169,12 +167,7 @@ class PeerLoop(TrainingLoop):
 
 
 class FollowerFolder(RunFolder):
-    """Where a process that is not the first keeps what only it knows: its robots. It lies inside the run.
-
-    Args:
-        run: folder of the run.
-        rank: of the process.
-    """
+    """Where a process that is not the first keeps what only it knows: its robots. It lies inside the run."""
 
     def __init__(self, run: RunFolder, rank: int) -> None:
         super().__init__(Path(run.path) / f"rank{rank}")

@@ -29,9 +29,6 @@ MAX_LOST = 20
 class RunFolder:
     """The files of one run.
 
-    Args:
-        path: the folder.
-
     Raises:
         InputError: from ``create`` and ``open``, see there.
     """

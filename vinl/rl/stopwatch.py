@@ -13,9 +13,6 @@ import torch
 class Stopwatch:
     """Seconds by name, waiting for the device before and after each part while it runs.
 
-    Args:
-        device: torch device.
-
     Attributes:
         running: whether it measures; otherwise ``part`` does nothing.
     """

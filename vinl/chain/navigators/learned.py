@@ -43,7 +43,6 @@ class DeadReckoning:
     """The odometry of n robots; the same key gives the same errors.
 
     Args:
-        config: errors.
         keys: (n,) below 2^31.
     """
 
@@ -80,7 +79,6 @@ class LearnedNavigator:
         period: between two decisions [s].
 
     Attributes:
-        policy: as given.
         camera: the policy's camera, None if it is blind.
 
     Raises:

@@ -89,7 +89,6 @@ class Recovery:
     there was room for it.
 
     Args:
-        n: robots.
         speed: at which a robot walks ahead once it has turned [m/s].
         turn_rate: at which it turns [rad/s].
 
@@ -169,8 +168,6 @@ class StuckPlaces:
     is asked for here.
 
     Args:
-        n: robots.
-        camera: of the navigator.
         period: between two decisions [s].
     """
 
@@ -188,7 +185,6 @@ class StuckPlaces:
         """Put a post before each robot that is stuck.
 
         Args:
-            stuck: which they are.
             pose: x, y [m] and yaw [rad] now.
         """
         for k in np.flatnonzero(stuck).tolist():
