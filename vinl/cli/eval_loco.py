@@ -5,13 +5,10 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vinl.cli.options import default_out, parse_options
 from vinl.config.errors import InputError
-
-if TYPE_CHECKING:
-    from vinl.policies.policy import Policy
 
 _BARS = {"height": (0.1,), "depth": 0.2, "speed": 0.5, "crossings": 32}
 """Options of bars alone, and what they are if not given."""
@@ -89,81 +86,47 @@ def main(argv: list[str]) -> int:
         if getattr(options, name) is not None and getattr(options, name) is not False:
             where = "is not for --terrain bars" if name in _COURSES else "is for --terrain bars alone"
             raise InputError(f"--{name} {where}")
-    run = _run_bars if options.terrain == "bars" else _run_courses
     out = check_out(default_out("eval-loco", *names[:3]) if options.out is None else options.out)
-    run(options, names, out, ["vinl", "eval-loco", *strip_command(argv)])
+    _run(options, names, out, ["vinl", "eval-loco", *strip_command(argv)])
     return 0
 
 
-def _run_courses(options: Options, names: list[str], out: Path, command: list[str]) -> None:
-    """Random commands on any ground but bars."""
+def _run(options: Options, names: list[str], out: Path, command: list[str]) -> None:
     from rich.console import Console
 
     from vinl.cli.progress import Progress
     from vinl.config.output import write_json
+    from vinl.courses import report
     from vinl.courses.evaluate import compare_locomotors
-    from vinl.courses.report import draw_contacts, label_policies, print_comparison, print_figures, results_as_dict
-
-    robots, seconds = _chosen(options, "robots"), _chosen(options, "seconds")
-    policies, console, workers = _load(names, options), Console(), _count_workers(options)
-    with Progress(console) as progress:
-        results = compare_locomotors(
-            policies,
-            options.terrain,
-            robots,
-            seconds,
-            options.seed,
-            options.density,
-            options.level,
-            options.commands,
-            workers,
-            progress.show,
-        )
-    compared = dict(zip(label_policies(names), results, strict=True))
-    write_json(out / "results.json", results_as_dict(compared, command, workers))
-    if options.terrain == "blocks" and results[0].config["ground"]["density"] > 0:
-        draw_contacts(compared, out / "contacts.png")
-    if options.compare:
-        print_comparison(console, compared)
-    else:
-        print_figures(console, results[0])
-    console.print(f"{results[0].wall_seconds:.0f} s; figures {out / 'results.json'}", soft_wrap=True)
-
-
-def _run_bars(options: Options, names: list[str], out: Path, command: list[str]) -> None:
-    """Bars across a corridor."""
-    from rich.console import Console
-
-    from vinl.cli.progress import Progress
-    from vinl.config.output import write_json
     from vinl.courses.evaluate_crossings import compare_crossings
-    from vinl.courses.report import label_policies, picture_crossings, print_crossings, results_as_dict
-
-    heights, depth, speed, crossings = (_chosen(options, name) for name in _BARS)
-    policies, console, workers = _load(names, options), Console(), _count_workers(options)
-    with Progress(console) as progress:
-        results = compare_crossings(
-            policies, heights, depth, speed, crossings, options.seed, options.video, workers, progress.show
-        )
-    compared = dict(zip(label_policies(names), results, strict=True))
-    write_json(out / "results.json", results_as_dict(compared, command, workers))
-    if options.video:
-        picture_crossings(compared, out)
-    print_crossings(console, compared)
-    console.print(f"{results[0].wall_seconds:.0f} s; figures {out / 'results.json'}", soft_wrap=True)
-
-
-def _chosen(options: Options, name: str) -> Any:
-    """An option's value, or what it is if not given."""
-    value = getattr(options, name)
-    return {**_BARS, **_COURSES}[name] if value is None else value
-
-
-def _count_workers(options: Options) -> int:
-    return os.cpu_count() or 1 if options.workers is None else options.workers
-
-
-def _load(names: list[str], options: Options) -> list[Policy]:
     from vinl.policies.io import load_policy
 
-    return [load_policy(name, options.device) for name in names]
+    terrain, seed, bars = options.terrain, options.seed, options.terrain == "bars"
+    chosen = dict(_BARS if bars else _COURSES)
+    chosen |= {name: value for name in chosen if (value := getattr(options, name)) is not None}
+    policies, console = [load_policy(name, options.device) for name in names], Console()
+    workers = os.cpu_count() or 1 if options.workers is None else options.workers
+    results: list[Any]
+    with Progress(console) as progress:
+        if bars:
+            heights = chosen.pop("height")
+            results = compare_crossings(
+                policies, heights, **chosen, seed=seed, traced=options.video, workers=workers, on_progress=progress.show
+            )
+        else:
+            results = compare_locomotors(
+                policies, terrain, **chosen, seed=seed, workers=workers, on_progress=progress.show
+            )
+    compared = dict(zip(report.label_policies(names), results, strict=True))
+    write_json(out / "results.json", report.results_as_dict(compared, command, workers))
+    if options.video:
+        report.picture_crossings(compared, out)
+    if terrain == "blocks" and results[0].config["ground"]["density"] > 0:
+        report.draw_contacts(compared, out / "contacts.png")
+    if bars:
+        report.print_crossings(console, compared)
+    elif options.compare:
+        report.print_comparison(console, compared)
+    else:
+        report.print_figures(console, results[0])
+    console.print(f"{results[0].wall_seconds:.0f} s; figures {out / 'results.json'}", soft_wrap=True)
