@@ -2,7 +2,6 @@
 
 import gzip
 import json
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -168,7 +167,7 @@ def write_houses(path, count: int) -> str:
     return str(path)
 
 
-def test_ranges_of_plans_are_judged_and_what_is_none_is_counted(tmp_path, monkeypatch):
+def test_ranges_of_plans_are_judged_and_what_is_none_is_counted(tmp_path):
     houses = write_houses(tmp_path / "houses.jsonl.gz", 5)
     assert expand_paths([f"{houses}:1-3", "b.yaml"]) == [*(f"{houses}:{k}" for k in (1, 2, 3)), "b.yaml"]
     assert expand_paths([f"{houses}:3-"]) == expand_paths([f"{houses}:3:5"]) == [f"{houses}:3", f"{houses}:4"]
@@ -178,7 +177,6 @@ def test_ranges_of_plans_are_judged_and_what_is_none_is_counted(tmp_path, monkey
             expand_paths([f"{houses}:{bad}"])
     with pytest.raises(InputError, match="no such file"):
         expand_paths([f"{tmp_path}/none.jsonl:0-3"])
-    monkeypatch.setitem(sys.modules, "jinja2", None)  # figures do not wait for a page
     out = tmp_path / "out"
     options = ["--policy", "oracle", "--episodes", "6", "--steps", "3", "--out", str(out)]
     assert main(["eval-nav", *options, "--floorplans", f"{houses}:1-2"]) == 0
@@ -186,7 +184,7 @@ def test_ranges_of_plans_are_judged_and_what_is_none_is_counted(tmp_path, monkey
     kind = data["kinds"]["houses"]
     assert kind["homes"] == kind["dropped"] == 1 and len(kind["reasons"]) == 1
     assert "houses.jsonl.gz:1: the plan is too small" in kind["reasons"][0]
-    assert not (out / "report.html").exists()
+    assert (out / "report.html").exists()
 
 
 def test_training_takes_ranges_and_drops_what_is_no_home(tmp_path):

@@ -151,14 +151,7 @@ def main(argv: list[str]) -> int:
         "timing": {"wall_seconds": round(time.monotonic() - begun, 2)},
     }
     write_json(out / "results.json", data)
-    try:
-        page = render_navigation_report(data, [(kind.records, kind.traces) for kind in results])
-        write_text(out / "report.html", page)
-        where = f"report {out / 'report.html'}; figures {out / 'results.json'}"
-    except ModuleNotFoundError as error:
-        if error.name != "jinja2":
-            raise
-        where = f"figures {out / 'results.json'}; no report.html: jinja2 is not installed (pip install jinja2)"
+    write_text(out / "report.html", render_navigation_report(data, [(kind.records, kind.traces) for kind in results]))
     print_navigation_summary(console, data)
     print_failures(console, {name: kind["failures"] for name, kind in data["kinds"].items()})
     for kind in results:
@@ -168,5 +161,5 @@ def main(argv: list[str]) -> int:
             )
         for reason in kind.reasons[:3]:
             console.print(f"  {reason}", soft_wrap=True)
-    console.print(where, soft_wrap=True)
+    console.print(f"report {out / 'report.html'}; figures {out / 'results.json'}", soft_wrap=True)
     return 0

@@ -97,9 +97,6 @@ def render_navigation_report(data: dict[str, Any], kinds: Sequence[tuple[Sequenc
     Args:
         data: what ``results.json`` holds.
         kinds: records and traces of each kind of home, in the order of ``data["kinds"]``.
-
-    Raises:
-        ModuleNotFoundError: jinja2 is not there.
     """
     parts = []
     for (name, kind), (records, traces) in zip(data["kinds"].items(), kinds, strict=True):
