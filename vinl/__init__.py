@@ -3,76 +3,51 @@
 The names below are the public ones; each part is imported when its first name is used.
 """
 
+# ruff: noqa: F401 - the names are for others
+
 from __future__ import annotations
 
 import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from vinl.benchmark.evaluate import evaluate as evaluate
-    from vinl.chain.config import EvaluationConfig as EvaluationConfig
-    from vinl.config.errors import InputError as InputError
-    from vinl.config.loader import load_config as load_config
-    from vinl.notebook.own import as_locomotor as as_locomotor
-    from vinl.notebook.own import as_navigator as as_navigator
-    from vinl.notebook.plans import draw_plan as draw_plan
-    from vinl.notebook.plans import sample_routes as sample_routes
-    from vinl.notebook.plans import scatter_clutter as scatter_clutter
-    from vinl.notebook.training import Training as Training
-    from vinl.notebook.training import train as train
-    from vinl.notebook.walk import Film as Film
-    from vinl.notebook.walk import Walk as Walk
-    from vinl.notebook.walk import show_video as show_video
-    from vinl.notebook.walk import walk as walk
-    from vinl.policies.card import PolicyCard as PolicyCard
-    from vinl.policies.io import list_policies as list_policies
-    from vinl.policies.io import load_policy as load_policy
-    from vinl.policies.io import save_policy as save_policy
-    from vinl.robot.cameras import LOCOMOTION_CAMERA as LOCOMOTION_CAMERA
-    from vinl.robot.cameras import NAVIGATION_CAMERA as NAVIGATION_CAMERA
-    from vinl.robot.cameras import Camera as Camera
-    from vinl.viewer.play import play as play
-    from vinl.viewer.play import replay as replay
-    from vinl.world.boxes import Blocks as Blocks
-    from vinl.world.boxes import Boxes as Boxes
-    from vinl.world.floorplan import FloorPlan as FloorPlan
-    from vinl.world.homes import generate_home as generate_home
-    from vinl.world.readers import load_floorplan as load_floorplan
-    from vinl.world.readers import shipped_floorplans as shipped_floorplans
+if TYPE_CHECKING:  # the same as _NAMES, for editors
+    from vinl.benchmark.evaluate import evaluate
+    from vinl.chain.config import EvaluationConfig
+    from vinl.config.errors import InputError
+    from vinl.config.loader import load_config
+    from vinl.notebook.own import as_locomotor, as_navigator
+    from vinl.notebook.plans import draw_plan, sample_routes, scatter_clutter
+    from vinl.notebook.training import Training, train
+    from vinl.notebook.walk import Film, Walk, show_video, walk
+    from vinl.policies.card import PolicyCard
+    from vinl.policies.io import list_policies, load_policy, save_policy
+    from vinl.robot.cameras import LOCOMOTION_CAMERA, NAVIGATION_CAMERA, Camera
+    from vinl.viewer.play import play, replay
+    from vinl.world.boxes import Blocks, Boxes
+    from vinl.world.floorplan import FloorPlan
+    from vinl.world.homes import generate_home
+    from vinl.world.readers import load_floorplan, shipped_floorplans
 
-_WHERE = {
-    "Blocks": "vinl.world.boxes",
-    "Boxes": "vinl.world.boxes",
-    "Camera": "vinl.robot.cameras",
-    "EvaluationConfig": "vinl.chain.config",
-    "Film": "vinl.notebook.walk",
-    "FloorPlan": "vinl.world.floorplan",
-    "InputError": "vinl.config.errors",
-    "LOCOMOTION_CAMERA": "vinl.robot.cameras",
-    "NAVIGATION_CAMERA": "vinl.robot.cameras",
-    "PolicyCard": "vinl.policies.card",
-    "Training": "vinl.notebook.training",
-    "Walk": "vinl.notebook.walk",
-    "as_locomotor": "vinl.notebook.own",
-    "as_navigator": "vinl.notebook.own",
-    "draw_plan": "vinl.notebook.plans",
-    "evaluate": "vinl.benchmark.evaluate",
-    "generate_home": "vinl.world.homes",
-    "list_policies": "vinl.policies.io",
-    "play": "vinl.viewer.play",
-    "replay": "vinl.viewer.play",
-    "load_config": "vinl.config.loader",
-    "load_floorplan": "vinl.world.readers",
-    "load_policy": "vinl.policies.io",
-    "sample_routes": "vinl.notebook.plans",
-    "save_policy": "vinl.policies.io",
-    "scatter_clutter": "vinl.notebook.plans",
-    "shipped_floorplans": "vinl.world.readers",
-    "show_video": "vinl.notebook.walk",
-    "train": "vinl.notebook.training",
-    "walk": "vinl.notebook.walk",
+_NAMES = {
+    "vinl.benchmark.evaluate": ("evaluate",),
+    "vinl.chain.config": ("EvaluationConfig",),
+    "vinl.config.errors": ("InputError",),
+    "vinl.config.loader": ("load_config",),
+    "vinl.notebook.own": ("as_locomotor", "as_navigator"),
+    "vinl.notebook.plans": ("draw_plan", "sample_routes", "scatter_clutter"),
+    "vinl.notebook.training": ("Training", "train"),
+    "vinl.notebook.walk": ("Film", "Walk", "show_video", "walk"),
+    "vinl.policies.card": ("PolicyCard",),
+    "vinl.policies.io": ("list_policies", "load_policy", "save_policy"),
+    "vinl.robot.cameras": ("LOCOMOTION_CAMERA", "NAVIGATION_CAMERA", "Camera"),
+    "vinl.viewer.play": ("play", "replay"),
+    "vinl.world.boxes": ("Blocks", "Boxes"),
+    "vinl.world.floorplan": ("FloorPlan",),
+    "vinl.world.homes": ("generate_home",),
+    "vinl.world.readers": ("load_floorplan", "shipped_floorplans"),
 }
+_WHERE = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = sorted([*_WHERE, "__version__"])  # pyright: ignore[reportUnsupportedDunderAll]
 
