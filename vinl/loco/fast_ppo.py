@@ -29,7 +29,7 @@ class FastPPO(PPO):
 
     Args:
         arguments, rest: as for rsl-rl's ``PPO``.
-        graphs: minibatches as a CUDA graph (one GPU only).
+        graphs: minibatches as a CUDA graph.
 
     Raises:
         ValueError: a setting that only rsl-rl's own update knows.
@@ -38,6 +38,7 @@ class FastPPO(PPO):
     def __init__(self, *arguments: Any, graphs: bool = False, **rest: Any) -> None:
         super().__init__(*arguments, **rest)
         other = {"rnd": self.rnd, "symmetry": self.symmetry, "mixed precision": self.use_mixed_precision}
+        other["several GPUs"] = self.is_multi_gpu
         unknown = [name for name, setting in other.items() if setting]
         if self.actor.is_recurrent or self.critic.is_recurrent:
             unknown.append("recurrent networks")
@@ -52,7 +53,7 @@ class FastPPO(PPO):
             capturable=self._on_gpu,
         )
         self.rate.bind(self.optimizer)
-        self._graph = StepGraph(self._learn) if graphs and self._on_gpu and not self.is_multi_gpu else None
+        self._graph = StepGraph(self._learn) if graphs and self._on_gpu else None
         self._sums = torch.zeros(len(_LOSSES), device=self.device)
         self._entropy_weight = torch.zeros((), device=self.device)
         self._advantages = torch.zeros_like(self.storage.advantages)
@@ -146,9 +147,6 @@ class FastPPO(PPO):
             with torch.no_grad():
                 old = tuple(pick(p) for p in st.distribution_params)
                 kl = self.actor.get_kl_divergence(old, self.actor.output_distribution_params).mean()
-                if self.is_multi_gpu:
-                    torch.distributed.all_reduce(kl)
-                    kl /= self.gpu_world_size
                 self.rate.steer(kl)
         ratio = torch.exp(log_prob - pick(st.actions_log_prob).squeeze(-1))
         bounded = ratio.clamp(1.0 - self.clip_param, 1.0 + self.clip_param)
@@ -161,8 +159,6 @@ class FastPPO(PPO):
         loss = surrogate + self.value_loss_coef * value_loss - self._entropy_weight * entropy
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
-        if self.is_multi_gpu:
-            self.reduce_parameters()
         nn.utils.clip_grad_norm_(self.actor.parameters(), self.max_grad_norm)
         nn.utils.clip_grad_norm_(self.critic.parameters(), self.max_grad_norm)
         self.optimizer.step()

@@ -17,6 +17,9 @@ REASONS = ("physics", "speed", "action", "reward", "observation")
 """What went wrong: position, velocity or torque is not finite; a joint is faster than any motor; the policy's action,
 the reward or the observation is not finite. The first that applies counts."""
 
+TRAITS = ("friction", "added_mass", "kp", "kd", "joint_friction")
+"""What is kept of what the robot is like, see ``randomisation.Traits``."""
+
 
 class Lost(NamedTuple):
     """States before the step that went wrong, in the order in which they came.
@@ -101,11 +104,7 @@ def keep_lost(
         command=state.command,
         targets=targets,
         delay=delay,
-        friction=state.traits.friction,
-        added_mass=state.traits.added_mass,
-        kp=state.traits.kp,
-        kd=state.traits.kd,
-        joint_friction=state.traits.joint_friction,
+        **{name: getattr(state.traits, name) for name in TRAITS},
         level=state.level,
         column=state.column,
         step=state.step,

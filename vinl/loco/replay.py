@@ -19,7 +19,7 @@ from vinl.config.errors import InputError
 from vinl.config.loader import build_config
 from vinl.loco.config import LocoConfig
 from vinl.loco.environment import MAX_SPEED
-from vinl.loco.nan_guard import Lost
+from vinl.loco.nan_guard import TRAITS, Lost
 from vinl.loco.randomisation import Traits, plain_traits
 from vinl.loco.simulation import Body, DeviceGround, Simulation, target_age, torque_range
 from vinl.robot.aliengo import FOOT_GEOMS, JOINTS, SUBSTEPS
@@ -129,8 +129,7 @@ Row = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 def _traits(v: dict[str, Any]) -> Traits:
     """Of the robot; what is only measured is left out."""
     plain = jax.tree.map(lambda x: x[0], plain_traits(1))
-    names = ("friction", "added_mass", "kp", "kd", "joint_friction")
-    return plain._replace(**{name: jnp.asarray(v[name], jnp.float32) for name in names})
+    return plain._replace(**{name: jnp.asarray(v[name], jnp.float32) for name in TRAITS})
 
 
 def _targets(v: dict[str, Any]) -> Iterator[np.ndarray]:

@@ -145,12 +145,7 @@ class Simulation:
     """
 
     def __init__(
-        self,
-        field: HeightField,
-        kp: float,
-        kd: float,
-        blocks: Blocks | None = None,
-        walls: Boxes | None = None,
+        self, field: HeightField, kp: float, kd: float, blocks: Blocks | None = None, walls: Boxes | None = None
     ) -> None:
         self.frame = field.frame
         rows, columns = field.frame.shape

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any
 
 import torch
 
@@ -18,7 +17,7 @@ from vinl.loco.student_config import StudentConfig
 from vinl.loco.terrain_cameras import TerrainCameras, terrain_mesh
 from vinl.loco.vec_env import CameraVecEnv
 from vinl.loco.warm_start import load_teacher
-from vinl.policies.card import PolicyCard, describe_action, locomotion_card
+from vinl.policies.card import describe_action, locomotion_card
 from vinl.policies.io import save_policy
 from vinl.policies.lineage import find_commit
 from vinl.policies.networks import StepActor
@@ -87,10 +86,12 @@ def train_student(
     teacher, origin = load_teacher(source, config)
     if not resume:
         run.create(dump_config(config))
+    action = describe_action(config.kp, config.kd)
     if not kept.is_dir():
         run.write_origin(asdict(origin))
-        network = teacher.describe()
-        save_policy(kept, teacher, _teacher_card(origin.policy, config, network, origin.samples, origin.commit))
+        known = {"samples": origin.samples, "commit": origin.commit}
+        card = locomotion_card(origin.policy, teacher.describe(), action, asdict(config.gait), **known)
+        save_policy(kept, teacher, card)
     described = run.read_origin()
     torch.manual_seed(config.seed)
     torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
@@ -106,7 +107,6 @@ def train_student(
     commit = find_commit()
 
     def export(policy: SteppingActor, samples: int) -> None:
-        action = {**describe_action(), "kp": config.kp, "kd": config.kd}
         card = locomotion_card(
             run.path.name,
             policy.describe(),
@@ -133,8 +133,3 @@ def train_student(
     if resume:
         loop.resume()
     return loop.train(iterations or config.iterations, minutes)
-
-
-def _teacher_card(name: str, config: LocoConfig, network: dict[str, Any], samples: int, commit: str) -> PolicyCard:
-    action = {**describe_action(), "kp": config.kp, "kd": config.kd}
-    return locomotion_card(name, network, action, asdict(config.gait), samples=samples, commit=commit)

@@ -118,7 +118,7 @@ def train_locomotor(
     if not resume:
         run.create(dump_config(config))
     if start is not None:
-        run.write_origin(start.describe())
+        run.write_origin(asdict(start.origin))
     origin = run.read_origin()
     torch.manual_seed(config.seed)
     torch.backends.cuda.matmul.allow_tf32 = True
@@ -169,7 +169,7 @@ def make_card(
     origin: dict[str, Any] | None = None,
 ) -> PolicyCard:
     """The card of a policy of this training; ``origin`` describes the policy that it started from."""
-    action = {**describe_action(), "kp": config.kp, "kd": config.kd}
+    action = describe_action(config.kp, config.kd)
     training = {**dump_config(config), **({"origin": origin} if origin else {})}
     learned = {"seed": config.seed, "samples": samples, "commit": commit}
     return locomotion_card(name, network, action, asdict(config.gait), training=training, **learned)

@@ -51,10 +51,6 @@ class WarmStart:
     critic: dict[str, Tensor] | None
     origin: Origin
 
-    def describe(self) -> dict[str, object]:
-        """The origin as plain data."""
-        return asdict(self.origin)
-
 
 def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
     """The networks of a policy (actor alone) or of a training run (actor and critic).
@@ -103,10 +99,7 @@ def load_teacher(name_or_path: str, config: LocoConfig) -> tuple[StepActor, Orig
     return policy.network, find_origin(policy.card, policy.network, critic=False)
 
 
-_KINDS = {
-    "SteppingActor": "a student itself (SteppingActor)",
-    "NavActor": "a navigator (NavActor)",
-}
+_KINDS = {"SteppingActor": "a student itself (SteppingActor)", "NavActor": "a navigator (NavActor)"}
 
 
 def _check_gait(name_or_path: str, card: PolicyCard, config: LocoConfig) -> None:

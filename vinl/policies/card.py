@@ -92,9 +92,9 @@ YAW_RATE = (-math.pi / 3, math.pi / 3)
 """Yaw rate at the actions -1 and 1 [rad/s] [paper: 60 deg/s]."""
 
 
-def describe_action() -> dict[str, Any]:
+def describe_action(kp: float = KP, kd: float = KD) -> dict[str, Any]:
     """How actions become joint targets on this robot, as plain data for a card."""
-    return {"scale": ACTION_SCALE, "default_pose": DEFAULT_POSE.tolist(), "kp": KP, "kd": KD}
+    return {"scale": ACTION_SCALE, "default_pose": DEFAULT_POSE.tolist(), "kp": kp, "kd": kd}
 
 
 def locomotion_card(

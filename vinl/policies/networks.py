@@ -20,10 +20,7 @@ from vinl.policies.symmetry import SymmetricMLP
 NETWORKS: dict[str, type[PolicyNetwork]] = {}
 """Class name to class: what a policy card may name."""
 
-ELSEWHERE = {
-    "NavActor": "vinl.policies.nav_actor",
-    "SteppingActor": "vinl.policies.stepping_actor",
-}
+ELSEWHERE = {"NavActor": "vinl.policies.nav_actor", "SteppingActor": "vinl.policies.stepping_actor"}
 """Networks that register when their module is imported, and the module."""
 
 
