@@ -37,10 +37,7 @@ class LocomotionController:
     """
 
     def __init__(
-        self,
-        policy: Policy,
-        cameras: DepthCameras | RealCameras | None,
-        gait: GaitReader | None = None,
+        self, policy: Policy, cameras: DepthCameras | RealCameras | None, gait: GaitReader | None = None
     ) -> None:
         self.policy, self._cameras, self._gait = policy, cameras, gait
         sensed = policy.card.observation_size == SENSED_TABLE.size
