@@ -198,22 +198,12 @@ class RecurrentStorage:
     def take(self, robots: Bool[Tensor, "..."] | Tensor) -> Minibatch:
         """All steps of the robots of an index (n,)."""
 
-        def pick(buffer: Tensor) -> Tensor:
-            return buffer.index_select(1, robots)
+        def pick(buffer: Any) -> Any:
+            if isinstance(buffer, tuple):
+                return tuple(map(pick, buffer))
+            return None if buffer is None else buffer.index_select(1, robots)
 
-        return Minibatch(
-            depth=None if self.depth is None else pick(self.depth),
-            vector=pick(self.vector),
-            state=tuple(pick(part) for part in self.state),
-            fresh=pick(self.fresh),
-            actions=pick(self.actions),
-            log_prob=pick(self.log_prob),
-            means=pick(self.means),
-            values=pick(self.values),
-            advantages=pick(self.advantages),
-            returns=pick(self.returns),
-            hidden=None if self.hidden is None else pick(self.hidden),
-        )
+        return Minibatch(*(pick(getattr(self, name)) for name in Minibatch._fields))
 
 
 CRITIC = "critic.safetensors"

@@ -149,6 +149,12 @@ class SteppingActor(PolicyNetwork):
         felt["joint_position"] = felt["joint_position"] + self.default_pose
         return felt
 
+    def stance(self, vector: Float[Tensor, "n 45"]) -> tuple[dict[str, Tensor], Tensor, Tensor]:
+        """What ``feel`` gives, the axes of the heading frame and the feet in it [m]."""
+        felt = self.feel(vector)
+        axes = heading_axes(torch, felt["projected_gravity"])
+        return felt, axes, into_heading_frame(axes, feet_in_trunk(torch, felt["joint_position"]))
+
     def network_input(self, vector: Float[Tensor, "n 45"], memory: Memory) -> Float[Tensor, "n 68"]:
         """What the estimator of the velocity is given: the robot's senses, the legs' phases, the velocity that it last
         said, and how fast the trunk would move if each foot stood still [m/s]."""
@@ -176,20 +182,14 @@ class SteppingActor(PolicyNetwork):
         """Heights about the robot, and the map after this step's image."""
         if self.elevation is None or then.map is None or image is None:
             return torch.zeros(len(vector), len(POINTS), device=vector.device), None
-        felt = self.feel(vector)
-        axes = heading_axes(torch, felt["projected_gravity"])
-        feet = into_heading_frame(axes, feet_in_trunk(torch, felt["joint_position"]))
+        felt, axes, feet = self.stance(vector)
         now = self.elevation.move(then.map, motion_of(torch, axes, velocity, felt["base_angular_velocity"]))
         now = self.elevation.see(now, image, axes, floor_under(torch, feet))
         return self.elevation.read(now), now
 
     def begin(self, vector: Float[Tensor, "n 45"], memory: Memory, fresh: Bool[Tensor, " n"]) -> Memory:
         """The memory before a step: robots that are fresh stand with their feet where they are."""
-        felt = self.feel(vector)
-        feet = into_heading_frame(
-            heading_axes(torch, felt["projected_gravity"]), feet_in_trunk(torch, felt["joint_position"])
-        )
-        start = start_gait(torch, self.gait, feet)
+        start = start_gait(torch, self.gait, self.stance(vector)[2])
         gait = GaitState(
             *(
                 torch.where(fresh.reshape(-1, *(1,) * (a.ndim - 1)), a, b)
@@ -205,10 +205,8 @@ class SteppingActor(PolicyNetwork):
         self, vector: Float[Tensor, "n 45"], said: Prediction, memory: Memory
     ) -> tuple[Float[Tensor, "n 12"], GaitState]:
         """Actions of what is believed, or known to be right, and the gait after them."""
-        felt = self.feel(vector)
+        felt, axes, feet = self.stance(vector)
         command = felt["command"]
-        axes = heading_axes(torch, felt["projected_gravity"])
-        feet = into_heading_frame(axes, feet_in_trunk(torch, felt["joint_position"]))
         motion = motion_of(torch, axes, said.velocity, felt["base_angular_velocity"])
         level = into_heading_frame(axes, said.velocity)[:, :2]
         gait = tick(torch, self.gait, memory.gait, motion, command, feet)
