@@ -102,13 +102,8 @@ def main(argv: list[str]) -> int:
     from vinl.config.output import check_out, strip_command
     from vinl.world.readers import load_floorplans
 
-    who = (
-        ("table",)
-        if options.table
-        else ("faults",)
-        if options.faults
-        else (options.loco or best_locomotor(), options.nav or best_navigator())
-    )
+    many = "table" if options.table else "faults" if options.faults else ""
+    who = (many,) if many else (options.loco or best_locomotor(), options.nav or best_navigator())
     out = check_out(default_out("eval", *who) if options.out is None else options.out)
     films: Films = "all" if options.video_all else "first" if options.video else "none"
     workers = 1 if options.workers is None else options.workers
@@ -117,7 +112,7 @@ def main(argv: list[str]) -> int:
         raise InputError("--faults does not go with --table; evaluate them one after the other")
     if options.cluster is not None and options.device == "cuda":
         raise InputError("--cluster asks policies on CPUs; leave --device cuda out")
-    check_folder(out, options.table or options.faults)
+    check_folder(out, bool(many))
     config = _load_rules(options)
 
     def prepare() -> Protocol:
@@ -187,13 +182,9 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], com
     from vinl.benchmark.table import Table, TableConfig, TableRow
     from vinl.config.loader import load_config
 
-    for name, given in (
-        ("--loco", options.loco),
-        ("--obstacles", options.obstacles),
-        ("--recovery", options.recovery or None),
-    ):
-        if given is not None:
-            raise InputError(f"{name} does not go with --table: its rows say who walks, through what clutter")
+    for name in ("loco", "obstacles", "recovery"):
+        if getattr(options, name):
+            raise InputError(f"--{name} does not go with --table: its rows say who walks, through what clutter")
     table = load_config(TableConfig, options.table_file).choose(options.rows, options.nav)
     present, left_out = leave_out(table, options.strict)
     loaded = [_load_row(row.loco, row.nav, row.obstacles, row.recovery, options) for row in present.values()]
@@ -205,10 +196,8 @@ def _run_table(options: Options, out: Path, prepare: Callable[[], Protocol], com
     keep_table(out, table, left_out, command)
     folders = [out / name for name in present]
     done = _walk(loaded, protocol, folders, options, command, console, out)
-    rows = [
-        TableRow(name, row.title, results, row.paper)
-        for (name, row), results in zip(present.items(), done, strict=True)
-    ]
+    walked = zip(present.items(), done, strict=True)
+    rows = [TableRow(name, row.title, results, row.paper) for (name, row), results in walked]
     print_table(console, write_table(out, Table(rows, reference, left_out, command)), out)
 
 
@@ -217,8 +206,7 @@ def _load_single(options: Options) -> Row:
     from vinl.chain.choose import best_locomotor, best_navigator
 
     loco, nav = options.loco or best_locomotor(), options.nav or best_navigator()
-    obstacles = options.obstacles or "paper"
-    return _load_row(loco, nav, obstacles, options.recovery, options)
+    return _load_row(loco, nav, options.obstacles or "paper", options.recovery, options)
 
 
 def _load_row(loco: str, nav: str, obstacles: str, recovery: bool, options: Options) -> Row:

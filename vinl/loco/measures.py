@@ -23,32 +23,12 @@ TERMS = tuple(field.name for field in fields(RewardConfig) if field.name not in 
 """The reward terms, in the order of the configuration."""
 
 MEASURES = (
-    "steps",
-    "reward",
-    "linear_tracking",
-    "yaw_tracking",
-    "linear_error2",
-    "yaw_error2",
-    "metres",
-    "falls",
-    "timeouts",
-    "episode_steps",
-    "foot_block",
-    "shank_block",
-    "foot_wall",
-    "over_block",
-    "covered",
-    "landings",
-    "not_finite",
-    "level",
-    "clipped",
-    "crossing",
-    "too_fast",
-    "swings",
-    "foot_error2",
-    "swing_hits",
-    "blocked",
-)
+    "steps", "reward", "linear_tracking", "yaw_tracking", "linear_error2",
+    "yaw_error2", "metres", "falls", "timeouts", "episode_steps",
+    "foot_block", "shank_block", "foot_wall", "over_block", "covered",
+    "landings", "not_finite", "level", "clipped", "crossing",
+    "too_fast", "swings", "foot_error2", "swing_hits", "blocked",
+)  # fmt: skip
 """Sums over robots and steps, before the reward terms."""
 
 
