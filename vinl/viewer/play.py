@@ -77,6 +77,8 @@ def play(
     if terrain is not None:
         world, plans = open_ground(terrain, seed, density), []
     else:
+        if plan is None and not shipped:
+            raise InputError("no floor plan is shipped with this version; give a file")
         chosen = plan if plan is not None else shipped[0]
         home = chosen if isinstance(chosen, FloorPlan) else load_floorplan(chosen)
         world = open_home(home, obstacles, seed, rules)

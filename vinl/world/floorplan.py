@@ -51,12 +51,19 @@ class RoomLabel:
 
 @dataclass(frozen=True, eq=False)
 class FloorPlan:
-    """One storey of a building, from a file, with ``:index`` where that holds several. A lintel over a door is a wall
-    whose bottom is above the floor.
+    """One storey of a building.
 
-    ``inside`` is the floor of the building, cells under walls and furniture may be either; ``free`` that which nothing
-    below ``BODY_HEIGHT`` covers. Windows and room names are only drawn: a pane or a shut door (a window from the floor
-    on, bottom 0) stops robot and depth camera like the wall does.
+    Attributes:
+        name: short name, for tables and pictures.
+        source: the file it came from, with ``:index`` where the file holds several.
+        walls: upright boxes; a lintel over a door is a box whose bottom is above the floor.
+        furniture: upright boxes.
+        inside: shape (rows, columns), the floor of the building; cells under walls and furniture may be either.
+        free: shape (rows, columns), floor inside that nothing below ``BODY_HEIGHT`` covers.
+        frame: where the cells of both grids lie.
+        windows: panes, and front doors (those from the floor on, bottom 0); only drawn, since a pane or a shut door
+            stops robot and depth camera like the wall does.
+        labels: room names; only drawn.
     """
 
     name: str

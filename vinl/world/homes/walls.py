@@ -24,11 +24,14 @@ Row = tuple[float, float, float, float, float, float, float]
 
 @dataclass
 class Edge:
-    """A stretch of line where two rectangles touch, or one and the outside: at a coordinate across, from one to another
-    along [m]; upright lines run along y.
+    """A stretch of line where two rectangles touch, or one and the outside.
 
-    ``rooms`` are the room on the side of smaller coordinates, then of larger, -1 outside; ``gaps`` its openings, from,
-    to, top [m].
+    Attributes:
+        upright: whether the line runs along y.
+        at: where the line lies across [m].
+        low, high: where it begins and ends along [m].
+        rooms: number of the room on the side of smaller coordinates, then of larger; -1 is outside.
+        gaps: (low, high, top) of its openings [m].
     """
 
     upright: bool
