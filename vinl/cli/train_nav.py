@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import socket
-import subprocess
-import sys
-import time
 from dataclasses import dataclass
 
 from vinl.cli.options import parse_options, settings_first
-from vinl.cli.training import INTERRUPTED, TrainingOptions
+from vinl.cli.training import INTERRUPTED, TrainingOptions, is_started, leads, start_processes
 from vinl.config.errors import InputError
 
 
@@ -37,11 +32,9 @@ def main(argv: list[str]) -> int:
     """Run the command; returns 130 after an interrupt."""
     options = parse_options(Options, settings_first(Options, argv), "train-nav")
     options.check()
-    if options.devices < 1:
-        raise InputError(f"--devices must be at least 1, got {options.devices}")
     if options.memory is not None and options.memory <= 0:
         raise InputError(f"--memory must be positive, got {options.memory}")
-    device = _choose_device(options)
+    device = options.choose_device()
 
     from vinl.cli.options import check_config
     from vinl.nav.config import NavConfig
@@ -52,11 +45,11 @@ def main(argv: list[str]) -> int:
     if not source.startswith("nav/") and not source.endswith((".yaml", ".yml")):  # bare names are those of configs/nav
         source = f"nav/{source}"
     folder, config, num_envs = options.open_run(NavConfig, "navigation", source, "nav-")
-    if options.devices > 1 and "RANK" not in os.environ:
-        return _start_processes(options.devices, argv)
+    if options.devices > 1 and not is_started():
+        return start_processes(options.devices, "train-nav", argv)
     from vinl.nav.training import train_navigator
 
-    if int(os.environ.get("RANK", "0")) == 0:
+    if leads():
         options.start_logger(folder)
     with explain_out_of_memory(num_envs):
         complete = train_navigator(
@@ -70,54 +63,10 @@ def main(argv: list[str]) -> int:
             profile=options.profile,
             memory=options.memory,
         )
-    if int(os.environ.get("RANK", "0")) == 0:
+    if leads():
         print(
             f"trained: {folder}/policy  (try: vinl eval-nav --policy {folder} --out {folder}/eval)"
             if complete
             else f"stopped and saved: go on with  vinl train-nav --resume {folder}"
         )
     return 0 if complete else INTERRUPTED
-
-
-def _choose_device(options: Options) -> str:
-    import torch
-
-    from vinl.policies.device import choose_training_device
-
-    device = choose_training_device(options.device)
-    if device != "cpu" and options.devices > torch.cuda.device_count():
-        raise InputError(f"--devices {options.devices}: there are only {torch.cuda.device_count()} CUDA devices")
-    return device
-
-
-def _start_processes(count: int, argv: list[str]) -> int:
-    """This very command in several processes, as torchrun would start them."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = str(probe.getsockname()[1])
-    common = {**os.environ, "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port, "WORLD_SIZE": str(count)}
-    command = [sys.executable, "-m", "vinl.cli.app", "train-nav", *argv]
-    processes = [
-        subprocess.Popen(command, env={**common, "RANK": str(rank), "LOCAL_RANK": str(rank)}) for rank in range(count)
-    ]
-    try:
-        return _wait_for_all(processes)
-    finally:
-        for process in processes:
-            if process.poll() is None:
-                process.terminate()
-
-
-def _wait_for_all(processes: list[subprocess.Popen[bytes]]) -> int:
-    """The first exit code that is not 0, once all have ended or one has failed."""
-    while True:
-        try:
-            codes = [process.poll() for process in processes]
-            failed = [code for code in codes if code not in (None, 0, INTERRUPTED)]
-            if failed:
-                return failed[0] if failed[0] > 0 else 1
-            if None not in codes:
-                return max(code or 0 for code in codes)
-            time.sleep(0.2)
-        except KeyboardInterrupt:  # the processes were interrupted too: they save and end
-            continue

@@ -1,8 +1,14 @@
-"""What ``vinl train-loco`` and ``vinl train-nav`` have in common: options, their checks, and where the curves go."""
+"""What ``vinl train-loco`` and ``vinl train-nav`` have in common: options, their checks, where the curves go, and one
+process a device."""
 
 from __future__ import annotations
 
+import os
+import socket
+import subprocess
+import sys
 import threading
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
@@ -22,6 +28,9 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 """Exit code after an interrupt that saved."""
 
+_PATIENCE = 10.0
+"""Seconds that a process has to end after another one failed."""
+
 
 @dataclass(frozen=True)
 class TrainingOptions:
@@ -40,6 +49,8 @@ class TrainingOptions:
     """Folder of a run to go on with; its own config is used."""
     device: str = "auto"
     """cpu, cuda, or auto: cuda where there is one."""
+    devices: int = 1
+    """GPUs of this machine to train on (on a CPU: processes)."""
     num_envs: int | None = None
     """Robots in parallel on each device (default: the config's)."""
     iterations: int | None = None
@@ -62,13 +73,29 @@ class TrainingOptions:
         """
         if self.save_every <= 0:
             raise InputError(f"--save-every must be positive, got {self.save_every}")
-        check_fields(self, "--", counts=("iterations",), positive=("minutes",))
+        check_fields(self, "--", counts=("iterations", "devices"), positive=("minutes",))
         if self.resume and self.from_policy:
             raise InputError("--from starts a new run and --resume goes on with an old one; give one of them")
         if self.resume and (self.overrides or self.config or self.out or self.num_envs or self.seed):
             raise InputError(
-                "--resume goes on with the run's own config; only --iterations, --minutes and --device may be given"
+                "--resume goes on with the run's own config; only --iterations, --minutes, --device and "
+                "--devices may be given"
             )
+
+    def choose_device(self) -> str:
+        """The kind of device that is trained on.
+
+        Raises:
+            InputError: there is none of it here, or there are fewer than asked for.
+        """
+        import torch
+
+        from vinl.policies.device import choose_training_device
+
+        device = choose_training_device(self.device)
+        if device != "cpu" and self.devices > torch.cuda.device_count() and not is_started():
+            raise InputError(f"--devices {self.devices}: there are only {torch.cuda.device_count()} CUDA devices")
+        return device
 
     def open_run(
         self, kind: type[AnyConfig], policy: str, source: str, prefix: str = ""
@@ -131,3 +158,51 @@ def _hush_writer() -> None:
             before(what)
 
     threading.excepthook = tell
+
+
+def is_started() -> bool:
+    """Whether this is one of the processes of a training, which ``start_processes`` or torchrun started."""
+    return "RANK" in os.environ
+
+
+def leads() -> bool:
+    """Whether this process speaks for the training: its first, or its only one."""
+    return int(os.environ.get("RANK", "0")) == 0
+
+
+def start_processes(count: int, command: str, argv: list[str]) -> int:
+    """This very command in several processes, as torchrun would start them; returns the exit code of the training."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = str(probe.getsockname()[1])
+    common = {**os.environ, "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port, "WORLD_SIZE": str(count)}
+    line = [sys.executable, "-m", "vinl.cli.app", command, *argv]
+    processes = [
+        subprocess.Popen(line, env={**common, "RANK": str(rank), "LOCAL_RANK": str(rank)}) for rank in range(count)
+    ]
+    try:
+        return _wait_for_all(processes)
+    finally:
+        for process in processes:
+            if process.poll() is None:
+                process.terminate()
+        for process in processes:
+            try:
+                process.wait(_PATIENCE)
+            except subprocess.TimeoutExpired:  # it waits on its GPU for one that is gone, and hears no signal
+                process.kill()
+
+
+def _wait_for_all(processes: list[subprocess.Popen[bytes]]) -> int:
+    """The first exit code that is not 0, once all have ended or one has failed."""
+    while True:
+        try:
+            codes = [process.poll() for process in processes]
+            failed = [code for code in codes if code not in (None, 0, INTERRUPTED)]
+            if failed:
+                return failed[0] if failed[0] > 0 else 1
+            if None not in codes:
+                return max(code or 0 for code in codes)
+            time.sleep(0.2)
+        except KeyboardInterrupt:  # the processes were interrupted too: they save and end
+            continue
