@@ -47,9 +47,9 @@ class NavTrainingEnv:
         places: whether observations hold where the robot has been lately, for the network to guess.
     """
 
-    def __init__(self, environment: NavEnvironment, places: bool = False, peers: Peers | None = None) -> None:
+    def __init__(self, environment: NavEnvironment, places: bool = False) -> None:
         self.environment, self._places = environment, places
-        self.num_envs = environment.num_envs * (peers.count if peers else 1)
+        self.num_envs = environment.num_envs
 
     def get_observations(self) -> TensorDict:
         """Of the present state."""
@@ -69,10 +69,9 @@ class NavTrainingEnv:
         """Of all robots."""
         return self.environment.save_state()
 
-    def load_state(self, state: dict[str, Any] | None) -> None:
-        """Go on from a saved state; None: the robots begin anew."""
-        if state is not None:
-            self.environment.load_state(state)
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Go on from a saved state."""
+        self.environment.load_state(state)
 
     def _pack(self, depth: torch.Tensor, vector: torch.Tensor) -> TensorDict:
         seen = {"vector": vector}
@@ -172,7 +171,7 @@ def train_navigator(
 
     loop = PeerLoop(
         peers,
-        NavTrainingEnv(environment, config.ppo.places > 0, peers),
+        NavTrainingEnv(environment, config.ppo.places > 0),
         algorithm,
         config.ppo.steps,
         peer_folder(run, peers),

@@ -130,6 +130,11 @@ class TrainingLoop:
         self.current_learning_iteration, self.samples = 0, 0
         self._stop = False
 
+    @property
+    def samples_per_iteration(self) -> int:
+        """Robot steps between updates, of all robots that are learned from."""
+        return self.steps * self.env.num_envs
+
     def describe_policy(self) -> dict[str, float]:
         """Figures of the policy for the curves."""
         return {}
@@ -146,7 +151,8 @@ class TrainingLoop:
             return False
         try:
             self.alg.load(checkpoint["algorithm"], None, True)
-            self.env.load_state(checkpoint["environment"])
+            if checkpoint["environment"] is not None:
+                self.env.load_state(checkpoint["environment"])
             self.current_learning_iteration, self.samples = checkpoint["iteration"], checkpoint["samples"]
             _set_random_state(checkpoint["random"])
         except (KeyError, RuntimeError, ValueError) as error:
@@ -185,7 +191,7 @@ class TrainingLoop:
             NotFiniteError: more than one robot step in a thousand of an iteration was not finite. The checkpoint is
                 written before, unless the policy itself is not finite.
         """
-        steps, wrong, sound = self.steps, None, True
+        wrong, sound = None, True
         first = self.current_learning_iteration
         writer = SummaryWriter(str(self.folder.path / "tensorboard"), purge_step=first)
         observation = self.env.get_observations().to(self.device)
@@ -207,13 +213,13 @@ class TrainingLoop:
                 losses = self._learn()
                 sound = all(map(math.isfinite, losses.values()))
                 self.current_learning_iteration += 1
-                self.samples += steps * self.env.num_envs
+                self.samples += self.samples_per_iteration
                 measures = self.env.read_measures()
                 end = time.perf_counter()
                 row = {
                     "iteration": self.current_learning_iteration,
                     "samples": self.samples,
-                    "samples_per_second": steps * self.env.num_envs / (end - start),
+                    "samples_per_second": self.samples_per_iteration / (end - start),
                     "update_seconds": end - collected,
                     "seconds": end - start,
                     "learning_rate": self.alg.learning_rate,
@@ -232,7 +238,7 @@ class TrainingLoop:
                     progress.show(count, self.figures(row))
                 else:
                     progress.show(round(time.monotonic() - begun), {"iteration": f"{count}", **self.figures(row)})
-                wrong = judge_losses(self.env, measures, steps * self.env.num_envs, count, self.folder)
+                wrong = self._judge(measures, count)
                 if wrong is None and sound and time.monotonic() - saved > self.save_every:
                     self.checkpoint()
                     saved = time.monotonic()
@@ -263,11 +269,15 @@ class TrainingLoop:
         try:
             return {name: float(value) for name, value in self.alg.update().items()}
         except (RuntimeError, ValueError) as error:
-            measures, robot_steps = self.env.read_measures(), self.steps * self.env.num_envs
-            wrong = judge_losses(self.env, measures, robot_steps, self.current_learning_iteration + 1, self.folder)
+            # of this process alone: another one may be anywhere
+            wrong = TrainingLoop._judge(self, self.env.read_measures(), self.current_learning_iteration + 1)
             if wrong is None:
                 raise
             raise NotFiniteError(f"{wrong}; the policy is not finite either: the checkpoint is old") from error
+
+    def _judge(self, measures: dict[str, float], iteration: int) -> str | None:
+        """Why the training must end after an iteration, see ``judge_losses``."""
+        return judge_losses(self.env, measures, self.steps * self.env.num_envs, iteration, self.folder)
 
     @contextlib.contextmanager
     def _interruptible(self, progress: TrainingProgress) -> Iterator[None]:

@@ -105,7 +105,12 @@ class PeerLoop(TrainingLoop):
     Args:
         arguments: as for ``TrainingLoop``; ``folder`` is what ``peer_folder`` returns.
         profile: write where the time of one iteration goes to ``profile.txt`` in the folder.
+
+    Attributes:
+        waits: whether a GPU is waited for once an iteration, so that the curves tell roll-out from update.
     """
+
+    waits = True
 
     def __init__(self, peers: Peers, *arguments: Any, profile: bool = False, **rest: Any) -> None:
         self.peers, self._asked, self._agreed = peers, False, False
@@ -139,15 +144,27 @@ class PeerLoop(TrainingLoop):
         fraction = super()._fraction_done(iterations, begun, minutes)
         return fraction if minutes is None else self.peers.first(fraction, self.device)
 
+    @property
+    def samples_per_iteration(self) -> int:
+        """Robot steps between updates, of the robots of all processes."""
+        return super().samples_per_iteration * self.peers.count
+
     def describe_policy(self) -> dict[str, float]:
         """Mean standard deviation of the actions."""
         return {"action_std": float(self.alg.get_policy().output_std.detach().mean())}
+
+    def _judge(self, measures: dict[str, float], iteration: int) -> str | None:
+        """Where the robots of one process went wrong, all end."""
+        wrong = super()._judge(measures, iteration)
+        if self.peers.any(wrong is not None, self.device):
+            return wrong or f"too many robots of another process were not finite in iteration {iteration}"
+        return None
 
     def _roll_out(self, observation: Any) -> Any:
         self._take_profile()
         observation = super()._roll_out(observation)
         self._agreed = self.peers.any(self._asked, self.device)
-        if str(self.device).startswith("cuda"):  # one wait an iteration: the curves tell roll-out from update
+        if self.waits and str(self.device).startswith("cuda"):
             torch.cuda.synchronize()
         return observation
 
@@ -179,6 +196,10 @@ class FollowerFolder(RunFolder):
     def cut_metrics(self, iteration: int) -> None:
         """The first process writes the curves."""
 
+    def save_lost(self, state: dict[str, Any]) -> Path | None:
+        """See ``RunFolder``; all processes save to the run itself."""
+        return self._run.save_lost(state)
+
     def load_checkpoint(self) -> dict[str, Any] | None:
         """The run's checkpoint with this process's own robots; without any they begin anew.
 
@@ -191,7 +212,8 @@ class FollowerFolder(RunFolder):
         own = super().load_checkpoint()
         if own is None:
             return {**checkpoint, "environment": None, "random": {"cpu": torch.get_rng_state()}}
-        algorithm = {**checkpoint["algorithm"], **{k: own["algorithm"][k] for k in ("memory", "fresh")}}
+        of_robots = {k: own["algorithm"][k] for k in ("memory", "fresh") if k in own["algorithm"]}
+        algorithm = {**checkpoint["algorithm"], **of_robots}
         return {**checkpoint, "algorithm": algorithm, "environment": own["environment"], "random": own["random"]}
 
 
