@@ -1,11 +1,15 @@
-"""The update without waits is rsl-rl's: weights, learning rate and losses, and either loads the other's state."""
+"""The update without waits is rsl-rl's: weights, learning rate and losses, and either loads the other's state. Two
+processes learn what one learns."""
 
 import contextlib
 import copy
 import io
+import os
+import socket
 
 import pytest
 import torch
+import torch.multiprocessing as mp
 from rsl_rl.algorithms import PPO
 from rsl_rl.env import VecEnv
 from rsl_rl.modules.distribution import GaussianDistribution
@@ -13,28 +17,29 @@ from tensordict import TensorDict
 
 from vinl.loco.fast_ppo import FastPPO
 from vinl.loco.models import UncheckedGaussian
+from vinl.rl.parallel import join_peers
 
 N, STEPS, SIZE, ACTIONS = 16, 6, 5, 3
 
 
 class NoiseEnv(VecEnv):
-    """Observations are noise, rewards prefer small actions."""
+    """Observations are noise, rewards prefer small actions. ``robots``: which of all N are here."""
 
-    def __init__(self):
-        self.num_envs, self.num_actions, self.device, self.cfg = N, ACTIONS, "cpu", {}
-        self.chance = torch.Generator().manual_seed(5)
+    def __init__(self, robots=slice(None)):
+        self.num_envs, self.num_actions, self.device, self.cfg = len(range(N)[robots]), ACTIONS, "cpu", {}
+        self.chance, self.robots = torch.Generator().manual_seed(5), robots
 
     def get_observations(self):
-        seen = torch.randn(N, SIZE, generator=self.chance)
-        return TensorDict({"policy": seen, "critic": seen + 1.0}, batch_size=[N])
+        seen = torch.randn(N, SIZE, generator=self.chance)[self.robots]
+        return TensorDict({"policy": seen, "critic": seen + 1.0}, batch_size=[self.num_envs])
 
     def step(self, actions):
-        reward = -actions.square().sum(1) + torch.randn(N, generator=self.chance)
-        done = torch.rand(N, generator=self.chance) < 0.2
+        reward = -actions.square().sum(1) + torch.randn(N, generator=self.chance)[self.robots]
+        done = torch.rand(N, generator=self.chance)[self.robots] < 0.2
         return self.get_observations(), reward, done.long(), {"time_outs": (done & (reward > 0)).float()}
 
 
-def build(name, env, **more):
+def build(name, env, seed=1, **more):
     settings = {
         "num_steps_per_env": STEPS,
         "multi_gpu": None,
@@ -48,7 +53,7 @@ def build(name, env, **more):
         "critic": {"class_name": "MLPModel", "hidden_dims": [16, 16], "activation": "elu"},
         "algorithm": {"class_name": name, "num_learning_epochs": 3, "num_mini_batches": 4, **more},
     }
-    torch.manual_seed(1)
+    torch.manual_seed(seed)
     with contextlib.redirect_stdout(io.StringIO()):
         return PPO.construct_algorithm(env.get_observations(), env, settings, "cpu")
 
@@ -134,3 +139,64 @@ def test_actions_are_drawn_as_rsl_rl_draws_them():
         distribution.update(mean)
         drawn.append(distribution.sample())
     assert torch.equal(*drawn) and not drawn[1].requires_grad
+
+
+SHARED = [
+    {"num_mini_batches": 1, "learning_rate": 3e-3},
+    {"num_mini_batches": 1, "normalize_advantage_per_mini_batch": True, "desired_kl": 1e-3},
+]
+"""One minibatch of all steps: whose robots are in it is not left to chance."""
+
+
+def learn_in_parts(robots, seed, peers=None):
+    """Weights, losses and rates, and divergences of three updates, by ``SHARED``; actions are drawn for all N robots
+    alike."""
+    results = []
+    for more in SHARED:
+        env = NoiseEnv(robots)
+        algorithm = build("vinl.loco.fast_ppo:FastPPO", env, seed, peers=peers, **more)
+        spread, chance = algorithm.actor.distribution, torch.Generator().manual_seed(7)
+
+        def sample(spread=spread, chance=chance, env=env):
+            mean = spread.mean.detach()
+            if len(mean) != env.num_envs:  # of a minibatch, where nobody acts
+                return mean
+            return mean + spread.std.detach() * torch.randn(N, ACTIONS, generator=chance)[env.robots]
+
+        spread.sample = sample
+        steer, kls = algorithm.rate.steer, []
+        algorithm.rate.steer = lambda kl, steer=steer, kls=kls: (kls.append(float(kl)), steer(kl))
+        rows = learn(algorithm, env, 3)
+        weights = {
+            **algorithm.actor.state_dict(),
+            **{f"critic.{k}": w for k, w in algorithm.critic.state_dict().items()},
+        }
+        results.append({"rows": rows, "weights": weights, "kls": kls})
+    return results
+
+
+def _learn_in_process(rank, port, folder):
+    os.environ.update(
+        WORLD_SIZE="2", RANK=str(rank), LOCAL_RANK=str(rank), MASTER_ADDR="127.0.0.1", MASTER_PORT=str(port)
+    )
+    peers, _ = join_peers("cpu")
+    half = slice(rank * N // 2, (rank + 1) * N // 2)
+    torch.save(learn_in_parts(half, 1 + rank, peers), f"{folder}/{rank}.pt")  # each with fresh weights of its own
+    peers.close()
+
+
+@pytest.mark.slow
+def test_two_processes_learn_what_one_learns_from_all_robots(tmp_path):
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    mp.spawn(_learn_in_process, (port, str(tmp_path)), nprocs=2)
+    first, second = (torch.load(tmp_path / f"{rank}.pt", weights_only=True) for rank in (0, 1))
+    for one, two, whole in zip(first, second, learn_in_parts(slice(None), 1), strict=True):
+        assert one["rows"] == two["rows"] and one["kls"] == two["kls"]
+        assert one["kls"] == pytest.approx(whole["kls"], rel=1e-2, abs=1e-6)
+        assert all(torch.equal(w, two["weights"][k]) for k, w in one["weights"].items())
+        for of_two, of_one in zip(one["rows"], whole["rows"], strict=True):
+            assert of_two == pytest.approx(of_one, rel=1e-3, abs=1e-5)
+        assert all(torch.allclose(w, whole["weights"][k], atol=2e-5, rtol=1e-4) for k, w in one["weights"].items())
+    assert len({row["rate"] for row in first[1]["rows"]}) > 1

@@ -1,6 +1,7 @@
 """Training from the command line: it runs on a CPU, survives SIGKILL, and goes on to the very same weights."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 import torch
 
+from vinl.cli import train_loco
 from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.gait.observation import STEPPING_TABLE
@@ -72,6 +74,10 @@ def test_resume_of_no_run_is_refused(tmp_path, capsys):
         (["--save-every", "-1"], "--save-every"),
         (["--resume", "x", "--seed", "3"], "--resume"),
         (["--device", "tpu"], "tpu"),
+        (["--devices", "0"], "--devices"),
+        (["--devices", "3", "--num-envs", "8"], "--devices 3: num_envs"),
+        (["--devices", "2", "ppo.update=rsl_rl"], "ppo.update"),
+        (["--devices", "2", "--stage", "3", "--from", "teacher"], "stage 3 is trained on one device"),
     ],
 )
 def test_bad_options_are_one_line(arguments, message, capsys, tmp_path):
@@ -80,6 +86,48 @@ def test_bad_options_are_one_line(arguments, message, capsys, tmp_path):
     error = capsys.readouterr().err
     assert message in error and len(error.strip().splitlines()) == 1 and "Traceback" not in error
     assert not any(tmp_path.iterdir())
+
+
+def test_more_gpus_than_there_are_are_refused(capsys, monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 1)
+    assert main(["train-loco", "--device", "cuda", "--devices", "2"]) == 2
+    assert capsys.readouterr().err == "error: --devices 2: there are only 1 CUDA devices\n"
+
+
+@pytest.mark.parametrize(("seen", "own"), [(None, "1"), ("4,6,7", "6"), ("-1", "")])
+def test_each_process_sees_one_gpu(seen, own, monkeypatch):
+    monkeypatch.setenv("LOCAL_RANK", "1")
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", seen or "")
+    if seen is None:
+        monkeypatch.delenv("CUDA_VISIBLE_DEVICES")
+    train_loco._see_one_gpu()
+    assert (os.environ["CUDA_VISIBLE_DEVICES"], os.environ["LOCAL_RANK"]) == (own, "0")
+
+
+def test_devices_share_the_robots(small_config):
+    parts = [small_config.separate(rank, 2) for rank in (0, 1)]
+    assert [(part.num_envs, part.seed) for part in parts] == [(4, 1), (4, 2)]
+    assert parts[1].terrain == small_config.terrain and small_config.separate(0, 1) is small_config
+
+
+@pytest.mark.slow
+def test_two_processes_train_one_policy(tmp_path, small_overrides, capfd):
+    run, all_robots = tmp_path / "run", "num_envs=16"  # eight each: compiled for other tests already
+    subprocess.run(
+        [*TRAIN, "--out", str(run), *small_overrides, all_robots, "iterations=2", "--devices", "2"], check=True
+    )
+    assert capfd.readouterr().out.count("trained") == 1
+    subprocess.run([*TRAIN, "--resume", str(run), "--iterations", "3", "--devices", "2"], check=True)
+    first, second = (torch.load(p / "checkpoint.pt", weights_only=True) for p in (run, run / "rank1"))
+    for name in ("actor_state_dict", "critic_state_dict"):
+        other = second["algorithm"][name]
+        assert all(torch.equal(w, other[k]) for k, w in first["algorithm"][name].items())
+    assert not torch.equal(first["environment"]["body.qpos"], second["environment"]["body.qpos"])
+    assert count_rows(run) == first["iteration"] == 3 and not count_rows(run / "rank1")
+    assert first["samples"] == load_policy(run).card.samples == 3 * 16 * 4
+    assert main(["train-loco", "--device", "cpu", "--resume", str(run)]) == 2
+    assert f"--devices 1: {run} was trained on 2" in capfd.readouterr().err
 
 
 def test_cuda_without_cuda_is_refused(capsys, tmp_path):

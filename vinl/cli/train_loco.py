@@ -5,10 +5,14 @@ from __future__ import annotations
 import os
 import sys
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from vinl.cli.options import parse_options, settings_first
-from vinl.cli.training import INTERRUPTED, TrainingOptions
+from vinl.cli.training import INTERRUPTED, TrainingOptions, is_started, leads, start_processes
 from vinl.config.errors import InputError
+
+if TYPE_CHECKING:
+    from vinl.loco.config import LocoConfig
 
 
 @dataclass(frozen=True)
@@ -25,6 +29,10 @@ class Options(TrainingOptions):
     stage: int = 1
     """1: walk on rough ground. 2: step over blocks, to footholds that are chosen on a map. 3: the same with a depth
     camera in place of the map; learns from a policy of stage 2."""
+    num_envs: int | None = None
+    """Robots in parallel, on all devices together (default: the config's)."""
+    devices: int = 1
+    """GPUs of this machine that share the robots of stage 1 or 2 (on a CPU: processes)."""
 
 
 STAGES = {1: "loco/rough", 2: "loco/teacher", 3: "loco/student"}
@@ -36,9 +44,9 @@ def main(argv: list[str]) -> int:
     if options.stage not in STAGES:
         raise InputError(f"--stage {options.stage} does not exist; choose {', '.join(map(str, STAGES))}")
     options.check()
-    from vinl.policies.device import choose_training_device
-
-    device = choose_training_device(options.device)
+    if is_started():
+        _see_one_gpu()
+    device = options.choose_device()
     os.environ.setdefault("JAX_PLATFORMS", "cpu" if device == "cpu" else "cuda,cpu")
 
     from vinl.rl.machine import use_compile_cache
@@ -54,21 +62,62 @@ def main(argv: list[str]) -> int:
         if options.stage not in (1, config.stage):
             raise InputError(f"--stage {options.stage}: {source} is a config of stage {config.stage}")
         config = replace(config, from_policy=options.from_policy or config.from_policy)
+    if not is_started():
+        _check_devices(options.devices, folder, config)
+        if options.devices > 1:
+            return start_processes(options.devices, "train-loco", argv)
     from rich.console import Console
 
-    with Console(stderr=True).status("loading JAX and the simulator"):  # some seconds; says nothing where it is piped
+    # some seconds; says nothing where it is piped
+    with Console(stderr=True, quiet=not leads()).status("loading JAX and the simulator"):
         from vinl.loco.training import train_locomotor
 
-    options.start_logger(folder)
+    if leads():
+        options.start_logger(folder)
     try:
         limits = {"iterations": options.iterations, "minutes": options.minutes}
         with explain_out_of_memory(num_envs):
             complete = train_locomotor(config, folder, device, save_every=options.save_every, **limits)
     except NotFiniteError as error:
+        if not leads():
+            return INTERRUPTED  # the first process says so, and fails
         print(f"error: {error}", file=sys.stderr)
         return 1
+    if not leads():
+        return 0 if complete else INTERRUPTED
     if complete:
         print(f"trained: {folder}/policy  (try: vinl eval --loco {folder})")
         return 0
-    print(f"stopped and saved: go on with  vinl train-loco --resume {folder}")
+    more = f" --devices {options.devices}" if options.devices > 1 else ""
+    print(f"stopped and saved: go on with  vinl train-loco --resume {folder}{more}")
     return INTERRUPTED
+
+
+def _see_one_gpu() -> None:
+    """JAX simulates on the first GPU that it sees, so each process of a training sees its own alone. To call before
+    anything asks for a GPU."""
+    local, seen = int(os.environ["LOCAL_RANK"]), os.environ.get("CUDA_VISIBLE_DEVICES")
+    own = [str(local)] if seen is None else seen.split(",")[local : local + 1]
+    os.environ.update(CUDA_VISIBLE_DEVICES=",".join(own), LOCAL_RANK="0")
+
+
+def _check_devices(devices: int, folder: str, config: LocoConfig | None) -> None:
+    """Refuse devices that cannot share the robots.
+
+    Args:
+        config: of a new run; None: the run in the folder goes on, with as many devices as it was saved with.
+
+    Raises:
+        InputError: they cannot.
+    """
+    from vinl.config.loader import build_config
+    from vinl.loco.config import LocoConfig
+    from vinl.rl.run_folder import CONFIG, RunFolder
+
+    run = RunFolder(folder)
+    resumed = build_config(LocoConfig, run.open(), source=str(run.path / CONFIG)) if config is None else config
+    robots = resumed.separate(0, devices).num_envs
+    saved = run.load_checkpoint() if config is None and resumed.stage != 3 else None
+    held = len(saved["environment"].get("step", ())) if saved else 0
+    if held and held != robots:
+        raise InputError(f"--devices {devices}: {folder} was trained on {resumed.num_envs // held}; give as many")

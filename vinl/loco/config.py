@@ -260,7 +260,7 @@ class LocoConfig:
     Attributes:
         stage: 1 (rough ground), 2 (blocks) or 3 (blocks, seen through a camera).
         from_policy: the policy or run whose networks the training starts from; None: fresh ones.
-        num_envs: robots in parallel.
+        num_envs: robots in parallel, on all devices together.
         iterations: updates.
         seed: of everything random.
         episode_length: [s] [ViNL config: 20].
@@ -295,3 +295,19 @@ class LocoConfig:
             raise InputError(f"stage {self.stage}: the group student belongs to stage 3, and to no other")
         check_limits(self, num_envs=(1, 65536))
         check_fields(self, counts=("iterations",), positive=("episode_length", "kp"), unsigned=("kd",))
+
+    def separate(self, rank: int, count: int) -> LocoConfig:
+        """What one of several devices simulates: its part of the robots, with random numbers of its own.
+
+        Raises:
+            InputError: this cannot be trained on so many devices.
+        """
+        if count == 1:
+            return self
+        if self.stage == 3:
+            raise InputError(f"--devices {count}: stage 3 is trained on one device; leave --devices out")
+        if self.ppo.update == "rsl_rl":
+            raise InputError(f"--devices {count}: ppo.update rsl_rl knows one device; choose fast or graphs")
+        if self.num_envs % count:
+            raise InputError(f"--devices {count}: num_envs must be a multiple of it, got {self.num_envs}")
+        return replace(self, num_envs=self.num_envs // count, seed=self.seed + rank)

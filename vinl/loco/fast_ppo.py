@@ -16,6 +16,7 @@ from tensordict import TensorDict
 from torch import Tensor, nn
 
 from vinl.rl.learning_rate import DeviceRate
+from vinl.rl.parallel import Peers
 from vinl.rl.step_graph import StepGraph
 
 _LOWEST, _HIGHEST = 1e-5, 1e-2
@@ -29,14 +30,19 @@ class FastPPO(PPO):
 
     Args:
         arguments, rest: as for rsl-rl's ``PPO``.
-        graphs: minibatches as a CUDA graph.
+        graphs: minibatches as a CUDA graph, where there is one process.
+        peers: processes that learn one policy, each from as many robots of its own; their numbers are those of one
+            process that has all robots. None: this is the only one.
 
     Raises:
         ValueError: a setting that only rsl-rl's own update knows.
     """
 
-    def __init__(self, *arguments: Any, graphs: bool = False, **rest: Any) -> None:
+    def __init__(self, *arguments: Any, graphs: bool = False, peers: Peers | None = None, **rest: Any) -> None:
         super().__init__(*arguments, **rest)
+        self.peers = peers or Peers()
+        for model in (self.actor, self.critic):
+            self.peers.share(model)
         other = {"rnd": self.rnd, "symmetry": self.symmetry, "mixed precision": self.use_mixed_precision}
         other["several GPUs"] = self.is_multi_gpu
         unknown = [name for name, setting in other.items() if setting]
@@ -53,7 +59,8 @@ class FastPPO(PPO):
             capturable=self._on_gpu,
         )
         self.rate.bind(self.optimizer)
-        self._graph = StepGraph(self._learn) if graphs and self._on_gpu else None
+        # whether messages between GPUs can be recorded is not tried: several processes learn without graphs
+        self._graph = StepGraph(self._learn) if graphs and self._on_gpu and self.peers.count == 1 else None
         self._sums = torch.zeros(len(_LOSSES), device=self.device)
         self._entropy_weight = torch.zeros((), device=self.device)
         self._advantages = torch.zeros_like(self.storage.advantages)
@@ -73,7 +80,10 @@ class FastPPO(PPO):
     def compute_returns(self, obs: TensorDict) -> None:
         """See rsl-rl; the advantages are kept in a place of their own."""
         super().compute_returns(obs)
-        self._advantages.copy_(self.storage.advantages)
+        st = self.storage
+        if self.peers.count > 1 and not self.normalize_advantage_per_mini_batch:  # rsl-rl knows its own robots alone
+            st.advantages = self._standardise(st.returns - st.values)
+        self._advantages.copy_(st.advantages)
 
     def update(self) -> dict[str, float]:
         """See rsl-rl; the device is waited for once, at the end."""
@@ -96,6 +106,7 @@ class FastPPO(PPO):
         observations = st.observations.flatten(0, 1)
         self.actor.update_normalization(observations)  # type: ignore[arg-type]
         self.critic.update_normalization(observations)  # type: ignore[arg-type]
+        self.peers.average(self._sums)
         means = (self._sums / (self.num_learning_epochs * self.num_mini_batches)).tolist()
         st.clear()
         return dict(zip(_LOSSES, means, strict=True))
@@ -126,6 +137,15 @@ class FastPPO(PPO):
         self.rate.desired_kl = self.desired_kl if self.schedule == "adaptive" else None
         self._entropy_weight.fill_(self.entropy_coef)
 
+    def _standardise(self, values: Tensor) -> Tensor:
+        """Values of any shape, less their mean over all processes, by their standard deviation."""
+        mean = values.mean()
+        self.peers.average(mean)
+        variance = (values - mean).square().mean()
+        self.peers.average(variance)
+        count = values.numel() * self.peers.count
+        return (values - mean) / ((variance * (count / (count - 1))).sqrt() + 1e-8)
+
     def _learn(self, index: Tensor) -> None:
         """One step of the optimiser on the steps of an index into the flattened roll-out."""
         st = self.storage
@@ -138,7 +158,7 @@ class FastPPO(PPO):
         old_values, returns = pick(st.values), pick(st.returns)
         advantages = pick(self._advantages).squeeze(-1)
         if self.normalize_advantage_per_mini_batch:
-            advantages = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
+            advantages = self._standardise(advantages)
         self.actor(observations, stochastic_output=True)
         log_prob = self.actor.get_output_log_prob(pick(st.actions))
         values = self.critic(observations)
@@ -147,6 +167,7 @@ class FastPPO(PPO):
             with torch.no_grad():
                 old = tuple(pick(p) for p in st.distribution_params)
                 kl = self.actor.get_kl_divergence(old, self.actor.output_distribution_params).mean()
+                self.peers.average(kl)
                 self.rate.steer(kl)
         ratio = torch.exp(log_prob - pick(st.actions_log_prob).squeeze(-1))
         bounded = ratio.clamp(1.0 - self.clip_param, 1.0 + self.clip_param)
@@ -159,6 +180,7 @@ class FastPPO(PPO):
         loss = surrogate + self.value_loss_coef * value_loss - self._entropy_weight * entropy
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
+        self.peers.average_gradients([*self.actor.parameters(), *self.critic.parameters()])
         nn.utils.clip_grad_norm_(self.actor.parameters(), self.max_grad_norm)
         nn.utils.clip_grad_norm_(self.critic.parameters(), self.max_grad_norm)
         self.optimizer.step()

@@ -12,21 +12,25 @@ import torch
 from rsl_rl.env import VecEnv
 from rsl_rl.runners import OnPolicyRunner
 
-from vinl.rl.loop import Figures, TrainingLoop
+from vinl.rl.loop import Figures
+from vinl.rl.parallel import PeerLoop, Peers
 from vinl.rl.run_folder import RunFolder
 
 
-class TrainingRunner(TrainingLoop, OnPolicyRunner):
+class TrainingRunner(PeerLoop, OnPolicyRunner):
     """rsl-rl's runner, which builds models and algorithm, with our loop.
 
     Args:
-        env: as for ``TrainingLoop``.
+        peers, env: as for ``PeerLoop``.
         settings: rsl-rl's configuration; a copy is used, because rsl-rl changes its own.
-        rest: as for ``TrainingLoop``.
+        rest: as for ``PeerLoop``.
     """
+
+    waits = False
 
     def __init__(
         self,
+        peers: Peers,
         env: VecEnv,
         settings: dict[str, Any],
         folder: RunFolder,
@@ -39,7 +43,7 @@ class TrainingRunner(TrainingLoop, OnPolicyRunner):
         with contextlib.redirect_stdout(io.StringIO()):  # rsl-rl prints its models
             OnPolicyRunner.__init__(self, env, copy.deepcopy(settings), None, device)
         steps = settings["num_steps_per_env"]
-        TrainingLoop.__init__(self, env, self.alg, steps, folder, device, export, figures, schedule, save_every)
+        PeerLoop.__init__(self, peers, env, self.alg, steps, folder, device, export, figures, schedule, save_every)
 
     def start_from(self, actor: dict[str, torch.Tensor], critic: dict[str, torch.Tensor] | None) -> None:
         """Take over trained weights; what they leave out, such as the actions' spread, stays as it was made.
@@ -54,6 +58,7 @@ class TrainingRunner(TrainingLoop, OnPolicyRunner):
             False,
         )
 
-    def describe_policy(self) -> dict[str, float]:
-        """Mean standard deviation of the actions."""
-        return {"action_std": self.alg.get_policy().output_std.mean().item()}
+    def _configure_multi_gpu(self) -> None:
+        """rsl-rl's own way to several GPUs, which a CPU does not have, is not used."""
+        self.cfg["multi_gpu"] = None
+        self.is_distributed, self.gpu_world_size, self.gpu_local_rank, self.gpu_global_rank = False, 1, 0, 0

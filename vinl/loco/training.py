@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -20,18 +21,19 @@ from vinl.loco.warm_start import load_warm_start
 from vinl.policies.card import PolicyCard, describe_action, locomotion_card
 from vinl.policies.io import save_policy
 from vinl.policies.lineage import find_commit
+from vinl.rl.parallel import Peers, join_peers, peer_folder
 from vinl.rl.run_folder import CHECKPOINT, RunFolder
 
 WARMUP_RATE = 1e-3
 """Learning rate while only the critic learns."""
 
 
-def rsl_rl_settings(config: LocoConfig) -> dict[str, Any]:
+def rsl_rl_settings(config: LocoConfig, peers: Peers | None = None) -> dict[str, Any]:
     """Our PPO settings under rsl-rl's names."""
     p = config.ppo
     update: dict[str, Any] = {"class_name": "PPO"}
     if p.update != "rsl_rl":
-        update = {"class_name": "vinl.loco.fast_ppo:FastPPO", "graphs": p.update == "graphs"}
+        update = {"class_name": "vinl.loco.fast_ppo:FastPPO", "graphs": p.update == "graphs", "peers": peers}
     return {
         "num_steps_per_env": p.steps,
         "obs_groups": {"actor": ["policy"], "critic": ["critic"]},
@@ -89,11 +91,12 @@ def train_locomotor(
     iterations: int | None = None,
     minutes: float | None = None,
 ) -> bool:
-    """Train a locomotor, or go on with a run.
+    """Train a locomotor, or go on with a run. Under torchrun, this is one of the processes.
 
     Args:
         config: of a new run; None resumes the run in ``folder``.
-        device: ``"cpu"`` or ``"cuda"``.
+        device: ``"cpu"`` or ``"cuda"``. JAX simulates on the first GPU that the process sees: of several processes,
+            each must see its own alone.
         save_every: seconds between checkpoints.
         iterations: updates in all; defaults to the configuration's.
         minutes: after which the training is over too; settings that move over the training keep to them.
@@ -109,24 +112,28 @@ def train_locomotor(
     resume = config is None
     if config is None:
         config = build_config(LocoConfig, run.open(), source=str(run.path / "config.yaml"))
+    own = config.separate(int(os.environ.get("RANK", "0")), int(os.environ.get("WORLD_SIZE", "1")))
     if config.stage == 3:
         from vinl.loco.student import train_student  # Warp is started for stage 3 alone
 
         return train_student(config, run, resume, device, save_every, iterations, minutes)
     begun = resume and (run.path / CHECKPOINT).exists()
     start = load_warm_start(config.from_policy, config) if config.from_policy and not begun else None
-    if not resume:
+    peers, device = join_peers(device)
+    if not resume and peers.leads:
         run.create(dump_config(config))
-    if start is not None:
+    if start is not None and peers.leads:
         run.write_origin(asdict(start.origin))
     origin = run.read_origin()
-    torch.manual_seed(config.seed)
+    torch.manual_seed(own.seed)
     torch.backends.cuda.matmul.allow_tf32 = True
-    environment = LocoEnvironment(config)
+    environment = LocoEnvironment(own)
     env = LocoVecEnv(environment, device)
     commit = find_commit()
 
     def export(model: StepModel, samples: int) -> None:
+        if not peers.leads:
+            return
         actor = model.export()
         card = make_card(run.path.name, config, actor.describe(), samples, commit, origin)
         save_policy(run.policy, actor, card)
@@ -139,12 +146,16 @@ def train_locomotor(
         if config.anneal.entropy is not None:
             algorithm.entropy_coef = config.anneal.blend(fraction, config.ppo.entropy, config.anneal.entropy)
 
-    runner = TrainingRunner(env, rsl_rl_settings(config), run, device, export, describe_figures, schedule, save_every)
+    settings, place = rsl_rl_settings(config, peers), peer_folder(run, peers)
+    runner = TrainingRunner(peers, env, settings, place, device, export, describe_figures, schedule, save_every)
     if start is not None:
         runner.start_from(training_names(start.actor), start.critic)
     if resume:
         runner.resume()
-    return runner.train(iterations or config.iterations, minutes)
+    try:
+        return runner.train(iterations or config.iterations, minutes)
+    finally:
+        peers.close()
 
 
 def teach_critic_first(algorithm: Any, iteration: int, ppo: LocoPpoConfig) -> None:
