@@ -4,20 +4,17 @@ processes learn what one learns."""
 import contextlib
 import copy
 import io
-import os
-import socket
 
 import pytest
 import torch
-import torch.multiprocessing as mp
 from rsl_rl.algorithms import PPO
 from rsl_rl.env import VecEnv
 from rsl_rl.modules.distribution import GaussianDistribution
 from tensordict import TensorDict
+from two_processes import run_two
 
 from vinl.loco.fast_ppo import FastPPO
 from vinl.loco.models import UncheckedGaussian
-from vinl.rl.parallel import join_peers
 
 N, STEPS, SIZE, ACTIONS = 16, 6, 5, 3
 
@@ -175,23 +172,14 @@ def learn_in_parts(robots, seed, peers=None):
     return results
 
 
-def _learn_in_process(rank, port, folder):
-    os.environ.update(
-        WORLD_SIZE="2", RANK=str(rank), LOCAL_RANK=str(rank), MASTER_ADDR="127.0.0.1", MASTER_PORT=str(port)
-    )
-    peers, _ = join_peers("cpu")
-    half = slice(rank * N // 2, (rank + 1) * N // 2)
-    torch.save(learn_in_parts(half, 1 + rank, peers), f"{folder}/{rank}.pt")  # each with fresh weights of its own
-    peers.close()
+def _learn_in_process(peers):
+    half = slice(peers.rank * N // 2, (peers.rank + 1) * N // 2)
+    return learn_in_parts(half, 1 + peers.rank, peers)  # each with fresh weights of its own
 
 
 @pytest.mark.slow
 def test_two_processes_learn_what_one_learns_from_all_robots(tmp_path):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    mp.spawn(_learn_in_process, (port, str(tmp_path)), nprocs=2)
-    first, second = (torch.load(tmp_path / f"{rank}.pt", weights_only=True) for rank in (0, 1))
+    first, second = run_two(_learn_in_process, tmp_path)
     for one, two, whole in zip(first, second, learn_in_parts(slice(None), 1), strict=True):
         assert one["rows"] == two["rows"] and one["kls"] == two["kls"]
         assert one["kls"] == pytest.approx(whole["kls"], rel=1e-2, abs=1e-6)

@@ -1,14 +1,11 @@
 """PPO for networks with memory: it learns what only memory solves, sees in the update what it saw when acting, goes on
 after a save, and averages over processes."""
 
-import os
-import socket
-
 import pytest
 import torch
-import torch.multiprocessing as mp
 from tensordict import TensorDict
 from torch import nn
+from two_processes import run_two
 
 from vinl.config.errors import InputError
 from vinl.nav.config import NavPpoConfig
@@ -196,28 +193,18 @@ def test_robots_that_do_not_divide_are_refused():
         build(n=6, minibatches=4)
 
 
-def _train_in_process(rank, port, folder):
-    os.environ.update(
-        WORLD_SIZE="2", RANK=str(rank), LOCAL_RANK=str(rank), MASTER_ADDR="127.0.0.1", MASTER_PORT=str(port)
-    )
-    peers, device = join_peers("cpu")
-    assert device == "cpu" and peers.rank == rank and peers.leads == (rank == 0)
-    torch.manual_seed(rank)  # other weights and other episodes in each process
+def _train_in_process(peers):
+    torch.manual_seed(peers.rank)  # other weights and other episodes in each process
     algorithm = build(n=8, minibatches=2, peers=peers)
     before = [p.detach().clone() for p in algorithm.model.parameters()]
     learn(algorithm, CueTask(8), 2)
-    assert peers.any(rank == 1) and not peers.any(False)
+    assert peers.any(peers.rank == 1) and not peers.any(False)
     after = [p.detach() for p in algorithm.model.parameters()]
-    torch.save({"before": before, "after": after, "rate": algorithm.learning_rate}, f"{folder}/{rank}.pt")
-    peers.close()
+    return {"before": before, "after": after, "rate": algorithm.learning_rate}
 
 
 def test_two_processes_keep_the_same_weights(tmp_path):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    mp.spawn(_train_in_process, (port, str(tmp_path)), nprocs=2)
-    one, two = (torch.load(tmp_path / f"{rank}.pt", weights_only=True) for rank in (0, 1))
+    one, two = run_two(_train_in_process, tmp_path)
     assert one["rate"] == two["rate"]
     for key in ("before", "after"):
         assert all(torch.equal(a, b) for a, b in zip(one[key], two[key], strict=True))

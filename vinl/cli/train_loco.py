@@ -112,12 +112,12 @@ def _check_devices(devices: int, folder: str, config: LocoConfig | None) -> None
     """
     from vinl.config.loader import build_config
     from vinl.loco.config import LocoConfig
+    from vinl.rl.parallel import count_processes
     from vinl.rl.run_folder import CONFIG, RunFolder
 
     run = RunFolder(folder)
     resumed = build_config(LocoConfig, run.open(), source=str(run.path / CONFIG)) if config is None else config
-    robots = resumed.separate(0, devices).num_envs
-    saved = run.load_checkpoint() if config is None and resumed.stage != 3 else None
-    held = len(saved["environment"].get("step", ())) if saved else 0
-    if held and held != robots:
-        raise InputError(f"--devices {devices}: {folder} was trained on {resumed.num_envs // held}; give as many")
+    resumed.separate(0, devices)
+    before = count_processes(run)
+    if before not in (0, devices):
+        raise InputError(f"--devices {devices}: {folder} was trained on {before}; give as many")

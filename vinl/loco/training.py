@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -112,14 +111,14 @@ def train_locomotor(
     resume = config is None
     if config is None:
         config = build_config(LocoConfig, run.open(), source=str(run.path / "config.yaml"))
-    own = config.separate(int(os.environ.get("RANK", "0")), int(os.environ.get("WORLD_SIZE", "1")))
+    peers, device = join_peers(device)
+    own = config.separate(peers.rank, peers.count)
     if config.stage == 3:
         from vinl.loco.student import train_student  # Warp is started for stage 3 alone
 
         return train_student(config, run, resume, device, save_every, iterations, minutes)
     begun = resume and (run.path / CHECKPOINT).exists()
     start = load_warm_start(config.from_policy, config) if config.from_policy and not begun else None
-    peers, device = join_peers(device)
     if not resume and peers.leads:
         run.create(dump_config(config))
     if start is not None and peers.leads:

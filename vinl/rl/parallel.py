@@ -16,7 +16,7 @@ from torch import Tensor, nn
 
 from vinl.config.output import write_text
 from vinl.rl.loop import TrainingLoop
-from vinl.rl.run_folder import RunFolder
+from vinl.rl.run_folder import CHECKPOINT, RunFolder
 
 
 class Peers:
@@ -220,3 +220,8 @@ class FollowerFolder(RunFolder):
 def peer_folder(run: RunFolder, peers: Peers) -> RunFolder:
     """The folder that a process writes to."""
     return run if peers.leads else FollowerFolder(run, peers.rank)
+
+
+def count_processes(run: RunFolder) -> int:
+    """How many processes have trained a run so far, by their folders; 0 before its first checkpoint."""
+    return 1 + len(list(run.path.glob("rank*/"))) if (run.path / CHECKPOINT).exists() else 0
