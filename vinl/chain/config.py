@@ -42,9 +42,18 @@ class FaultConfig:
     imu_noise: float = 0.0
 
     def __post_init__(self) -> None:
-        scales = {"kp_scale": 0.1, "kd_scale": 0.0, "mass_scale": 0.1, "friction_scale": 0.01}
-        least = {**scales, "velocity_noise": 0.0, "velocity_bias": 0.0, "imu_noise": 0.0}
-        check_limits(self, "faults.", action_delay=(0.0, 0.5), **{name: (low, 10.0) for name, low in least.items()})
+        check_limits(
+            self,
+            "faults.",
+            action_delay=(0.0, 0.5),
+            kp_scale=(0.1, 10.0),
+            kd_scale=(0.0, 10.0),
+            mass_scale=(0.1, 10.0),
+            friction_scale=(0.01, 10.0),
+            velocity_noise=(0.0, 10.0),
+            velocity_bias=(0.0, 10.0),
+            imu_noise=(0.0, 10.0),
+        )
         if abs(self.action_delay / PHYSICS_DT - self.delay_steps) > 1e-6:
             raise InputError(f"faults.action_delay must be a multiple of {PHYSICS_DT:g} s, got {self.action_delay:g}")
 

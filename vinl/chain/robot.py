@@ -22,6 +22,11 @@ from vinl.world.boxes import Boxes
 KINDS = ("foot_block", "foot_wall", "leg_block", "leg_wall", "trunk_block", "trunk_wall")
 """What may touch what. A leg is hip, thigh and shank; furniture counts as wall."""
 
+KINDS_OF = {
+    limb: tuple(k for k, kind in enumerate(KINDS) if kind.startswith(limb)) for limb in ("foot", "leg", "trunk")
+}
+"""Numbers of the kinds of contact of each limb."""
+
 FOOT_LIFT = 0.05
 """The paper's rule: a foot whose middle is higher than this [m] stands on something [ViNL code]."""
 

@@ -159,13 +159,11 @@ def _build_tiles(config: GroundConfig) -> Ground:
     if config.terrain == "rooms":
         none = {"slope": 0.0, "rough_slope": 0.0, "stairs_up": 0.0, "stairs_down": 0.0, "discrete": 0.0}
         rooms = {"rooms": 1.0, "columns": _ROOM_COLUMNS, "block_density": config.density, "wall_blocks": 1.0}
-        tiles = replace(tiles, **none, **rooms)
-    terrain, boxes = build_terrain(tiles), Boxes.empty()
-    if config.terrain == "rooms":
+        terrain, spread = build_terrain(replace(tiles, **none, **rooms)), _ROOM_SPREAD
         model = build_scene(terrain.tall, terrain.blocks.boxes(), kp=config.kp, kd=config.kd)
     else:
-        model = build_scene(boxes, boxes, terrain.ground, config.kp, config.kd)
-    spread = _ROOM_SPREAD if config.terrain == "rooms" else 0.5
+        terrain, spread = build_terrain(tiles), 0.5
+        model = build_scene(Boxes.empty(), Boxes.empty(), terrain.ground, config.kp, config.kd)
     # the first level is level floor, so that 9, 8 ... 1, 9 ... has a mean of at least 5 for any number of robots
     chosen = [config.level] if config.level is not None else list(range(9, 0, -1))
     columns = len(terrain.kinds)

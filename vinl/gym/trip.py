@@ -16,7 +16,7 @@ from vinl.chain.episode import EpisodeSetup, Recorder
 from vinl.chain.metrics import tracking_errors
 from vinl.chain.navigators.base import Navigator, Task, decide, goal_in_heading_frame
 from vinl.chain.records import Episode
-from vinl.chain.robot import KINDS, Robot
+from vinl.chain.robot import KINDS, KINDS_OF, Robot
 from vinl.chain.scene import build_scene
 from vinl.policies.policy import Policy
 from vinl.render.raytrace import ChaseCamera, RayRenderer
@@ -26,7 +26,6 @@ from vinl.robot.rotation import yaw_of
 from vinl.world.free_space import FreeSpace, distance_field, read_field
 
 _WALLS = {k for k, kind in enumerate(KINDS) if kind.endswith("_wall")}
-_FEET = {k for k, kind in enumerate(KINDS) if kind.startswith("foot_")}
 
 
 class Trip:
@@ -96,7 +95,7 @@ class Trip:
         self.steps += 1
         self._recorder.count(self.steps, self.robot, tracking_errors(self.qpos, self.qvel, command)[0])
         touched = self.robot.contacts.touches.keys()
-        self.foot_steps += bool(_FEET & touched)
+        self.foot_steps += not touched.isdisjoint(KINDS_OF["foot"])
         self.touched_wall = bool(_WALLS & touched)
         if np.linalg.norm(self.robot.qpos[:2] - self.setup.route.goal) < self._rules.success_radius:
             self._end("success")

@@ -12,6 +12,7 @@ from jaxtyping import Float, UInt8
 
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.records import Episode, name_episode
+from vinl.chain.robot import KINDS_OF
 from vinl.chain.rollout import InterruptedRunError
 from vinl.render.panels import MapPanel, colour_depth, compose, write_caption, write_film
 from vinl.render.raytrace import ChaseCamera, RayRenderer, look_at
@@ -95,7 +96,7 @@ def draw_frames(job: FilmJob, config: EvaluationConfig) -> Iterator[UInt8[np.nda
             f"{time:5.1f} s" + (f"   ({pace} x)" if pace > 1 else ""),
             f"command {trace.commands[chosen[k], 0]:.2f} m/s, {trace.commands[chosen[k], 2]:+.2f} rad/s",
             f"speed {speed[k]:.2f} m/s",
-            f"contact steps: foot {count_steps(seen, (0, 1))}, leg {count_steps(seen, (2, 3))}",
+            f"contact steps: foot {count_steps(seen, 'foot')}, leg {count_steps(seen, 'leg')}",
             "" if k < len(poses) - 1 else record.end_reason,
         ]
         path = trace.poses[: chosen[k] + 1 : 2, :2]
@@ -122,9 +123,9 @@ def _speeds(poses: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     return np.convolve(np.pad(ahead, 2, mode="edge"), np.full(5, 0.2), mode="valid")
 
 
-def count_steps(contacts: np.ndarray, kinds: tuple[int, ...]) -> int:
-    """Control steps with a contact of one of the kinds, which are numbers in ``KINDS``."""
-    return len(np.unique(contacts[np.isin(contacts[:, 1], kinds), 0]))
+def count_steps(contacts: np.ndarray, limb: str) -> int:
+    """Control steps with a contact of a limb, one of ``KINDS_OF``."""
+    return len(np.unique(contacts[np.isin(contacts[:, 1], KINDS_OF[limb]), 0]))
 
 
 SIZE = (640, 480)

@@ -16,7 +16,7 @@ from vinl.chain.controller import open_controller
 from vinl.chain.depth_cameras import CameraErrors, DepthCameras, RealCameras, open_depth_cameras
 from vinl.chain.navigators.base import Navigator, Task, decide
 from vinl.chain.navigators.learned import DeadReckoning
-from vinl.chain.robot import FaultyState, Robot, build_model
+from vinl.chain.robot import KINDS_OF, FaultyState, Robot, build_model
 from vinl.chain.scene import FORCE_SENSORS
 from vinl.config.errors import InputError
 from vinl.policies.policy import Policy
@@ -191,8 +191,8 @@ class LiveChain:
         self._contacts.extend((time, touch.kind, touch.x, touch.y, touch.z) for touch in touches)
         while self._contacts and self._contacts[0][0] < time - CONTACT_MEMORY:
             self._contacts.popleft()
-        for limb in {touch.kind // 2 for touch in touches}:  # see KINDS
-            self._limb_steps[limb] += 1
+        for k, kinds in enumerate(KINDS_OF.values()):
+            self._limb_steps[k] += any(touch.kind in kinds for touch in touches)
 
     def _put_down(self, pose: Float[np.ndarray, "3"]) -> None:
         """Let the robot stand somewhere, all memory gone; a goal stays."""

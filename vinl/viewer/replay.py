@@ -79,7 +79,7 @@ class Replay:
             path=self._poses[: k + 1 : _PATH_EVERY, :2],
             distance_m=float(self._walked[k]),
             contacts=np.column_stack([latest, np.full(len(latest), _CONTACT_HEIGHT)]),
-            contact_steps=(count_steps(seen, (0, 1)), count_steps(seen, (2, 3)), count_steps(seen, (4, 5))),
+            contact_steps=(count_steps(seen, "foot"), count_steps(seen, "leg"), count_steps(seen, "trunk")),
             feet=self._data.geom_xpos[self._feet].copy(),
             foot_forces=np.zeros(4),
             images=self._images,
