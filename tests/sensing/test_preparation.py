@@ -44,7 +44,7 @@ def test_the_camera_says_what_becomes_of_them():
     def prepare(missing: str) -> list[float]:
         return prepare_depth(Camera(**{**camera.describe(), "missing": missing}), depth)[0, 0].tolist()
 
-    assert prepare("fill") == pytest.approx([0.2, 0.2, 1.0, 1.0])
+    assert prepare("fill") == pytest.approx([0.2, 0.2, 0.2, 0.2])  # as a real camera, which sees nothing beyond
     assert prepare("plane") == pytest.approx([0.2, MARK, MARK, 1.0])
     assert prepare("as_is")[:2] == pytest.approx([0.2, 0.0])
     with pytest.raises(InputError, match="missing"):

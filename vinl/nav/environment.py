@@ -426,8 +426,7 @@ class NavEnvironment:
         if self._sensor.config.spoils:
             self._launch(draw_keys, n, ["chance", _DRAWN_AT_LOOK, "key"])
             depth = self._sensor.spoil(depth, self._rows, self._key, *self._camera_pose, unit=self.camera.far)
-            depth = settle_missing(self.camera.missing, depth, ~(depth > 0))
-        return depth, vector
+        return settle_missing(self.camera.missing, depth, ~(depth > 0)), vector
 
     def _launch(self, kernel: Any, dim: int | tuple[int, ...], inputs: list[Any]) -> None:
         launch(kernel, dim, [self._wrapped[x] if isinstance(x, str) else x for x in inputs], self.device)

@@ -12,7 +12,8 @@ from vinl.config.errors import InputError
 
 MISSING = ("as_is", "fill", "plane")
 """What a policy's preparation does with pixels without a return: it leaves the image as it is, which then reads as the
-far limit there; fills them from their neighbours; or hands their places to the network as a second plane."""
+far limit there; fills them, and what lies beyond the far limit, from their neighbours; or hands their places to the
+network as a second plane."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Camera:
         pitch_down: angle of the optical axis below the trunk's x axis [rad]; negative looks up.
         hfov: horizontal field of view [rad]; pixels are square, the vertical one follows from the image size.
         width, height: image size [pixels].
-        far: what is farther, or nothing hit, reads as this [m].
+        far: what is farther, or nothing hit, reads as this [m], unless it is filled.
         missing: what becomes of pixels without a return before the network, one of ``MISSING``, see
             ``vinl.sensing.preparation``.
     """

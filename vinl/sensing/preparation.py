@@ -24,9 +24,9 @@ def settle_missing(
     missing: str, image: Float[Tensor, "*n height width"], lost: Bool[Tensor, "*n height width"]
 ) -> Float[Tensor, "*n height width"]:
     """A normalised image whose lost pixels are left as they are (``"as_is"``), filled (``"fill"``) or marked
-    (``"plane"``)."""
+    (``"plane"``). To be filled is also what lies beyond the far limit: a real camera has no return from there."""
     if missing == "fill":
-        return fill_missing(image, lost)
+        return fill_missing(image, lost | (image >= 1))
     if missing == "plane":
         return torch.where(lost, MARK, image)
     return image
