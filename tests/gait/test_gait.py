@@ -62,6 +62,19 @@ def walk(steps: int, command: np.ndarray) -> tuple[GaitState, np.ndarray]:
     return gait, feet
 
 
+@pytest.mark.parametrize(("freeze", "moves"), [(0.9, True), (0.5, False)])
+def test_a_foothold_follows_the_plan_until_its_swing_is_so_far(freeze: float, moves: bool) -> None:
+    command = commands((0.5, 0, 0))
+    gait, feet = walk(60, command)
+    late = np.full((1, 4), 0.7, np.float32) * swing_fraction(np, CONFIG, gait.period)[:, None]
+    gait = gait._replace(phases=late)
+    level = 0 * late
+    ahead = np.stack([level + 0.05, level], -1)
+    plan = Plan(ahead, level, level + CONFIG.lift, level + 1.0)
+    after = aim(np, CONFIG, gait, plan, command[:, :2], command, feet, freeze)
+    assert ((np.abs(after.target - gait.target) > 1e-3).any(-1) == moves).all()
+
+
 def test_period_follows_the_commanded_speed() -> None:
     period = wanted_period(np, CONFIG, commands((0.6, 0, 0), (2.0, 0, 0), (0, 0, 0)))
     assert period[0] == pytest.approx(CONFIG.stride / 0.6)

@@ -197,13 +197,23 @@ def stance_places(config: GaitConfig) -> Float[np.ndarray, "4 2"]:
     return np.array([[x, y], [x, -y], [-x, y], [-x, -y]], np.float32)
 
 
-def aim(xp: Any, config: GaitConfig, gait: GaitState, plan: Plan, velocity: Any, command: Any, feet: Any) -> GaitState:
+def aim(
+    xp: Any,
+    config: GaitConfig,
+    gait: GaitState,
+    plan: Plan,
+    velocity: Any,
+    command: Any,
+    feet: Any,
+    freeze: float = FREEZE,
+) -> GaitState:
     """Take a plan over: targets and apexes of all feet but those about to come down, and the clock's rate.
 
     Args:
         xp, config, gait, command, feet: as for ``tick``, whose result ``gait`` is.
         plan: for this control step.
         velocity: (n, 2) of the trunk, forward and left [m/s].
+        freeze: fraction of a swing after which its foothold stays.
     """
     nominal, heading = raibert(xp, config, gait, velocity, command)
     xy = nominal + turn(xp, heading, plan.offset)
@@ -211,7 +221,7 @@ def aim(xp: Any, config: GaitConfig, gait: GaitState, plan: Plan, velocity: Any,
     swinging = phases < fraction
     base = xp.where(swinging, gait.lift[..., 2], feet[..., 2])
     target = xp.concatenate([xy, (base + plan.rise)[..., None]], -1)
-    frozen = swinging & (phases > FREEZE * fraction)
+    frozen = swinging & (phases > freeze * fraction)
     target = xp.where(frozen[..., None], gait.target, target)
     apex = xp.where(frozen, gait.apex, base + plan.apex)
     over = xp.amax(xp.where(swinging, apex - gait.lift[..., 2], 0 * apex), -1) - config.lift + LINK + _OVER

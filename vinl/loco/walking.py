@@ -32,6 +32,10 @@ from vinl.world.grid import GridFrame
 MIDDLE = (0.2, 0.85)
 """Between these fractions of its swing a foot should touch nothing."""
 
+_FREEZE = 0.5
+"""Fraction of a swing after which a foothold stays in training; ``vinl.gait.state.FREEZE`` holds when a policy walks.
+Feet that learn on footholds which move until late come down short of them (docs/research, 26 November)."""
+
 _ALONG_SHANK = (0.12, 0.25, 0.4, 0.6, 0.8)
 """Places along a shank that are held against blocks, from the foot (0) to the knee (1)."""
 
@@ -83,7 +87,7 @@ def go_on(
     view = FieldView(jnp, ground.map, frame, body.qpos)
     if planned:
         plan = plan_footholds(jnp, config, view if config.map else None, gait, velocity, command, feet)
-        gait = aim(jnp, config, gait, plan, velocity, command, feet)
+        gait = aim(jnp, config, gait, plan, velocity, command, feet, _FREEZE)
 
     swing, fraction = swings(jnp, config, gait), swing_fraction(jnp, config, gait.period)[:, None]
     progress = gait.phases / fraction
