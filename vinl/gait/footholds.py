@@ -40,11 +40,14 @@ _WIDTH = (0.15, 0.10)
 _INWARD = 0.05, 0.03
 """A foothold this much nearer to the other side's feet is free; farther in, so much more costs 1 [m]."""
 
-EDGE, _SHANK = 0.035, 0.04
-"""Footholds are forbidden whose foot is with its surface, whose shank with its axis nearer to a block than this [m]."""
+EDGE, _SHANK = 0.03, 0.04
+"""Footholds cost whose foot is with its surface, whose shank with its axis nearer to a block than this [m]."""
+
+_NEAR, _ROOM = 200.0, 0.005
+"""What each metre nearer costs, and how far that goes [m]: over what is high, it is this or reach."""
 
 _BLOCKED, _DEEP = (30.0, 12.0), (300.0, 200.0)
-"""What a foothold costs whose foot, whose shank is too near to a block, and each metre that it is."""
+"""What a foothold costs whose foot, whose shank is nearer still, and each metre that it is."""
 
 _OUT_OF_REACH = 300.0
 """What each metre beyond the leg's reach costs."""
@@ -141,7 +144,7 @@ def obstruction(
 
 
 def _price(xp: Any, lack: Any, kind: int) -> Any:
-    return xp.where(lack > 0, _BLOCKED[kind] + _DEEP[kind] * lack, 0.0)
+    return xp.where(lack > _ROOM, _BLOCKED[kind] + _DEEP[kind] * lack, _NEAR * xp.clip(lack, 0.0, None))
 
 
 # ---- the clocks' rates -----------------------------------------------------------------------------------------------
