@@ -6,8 +6,9 @@ import pytest
 import torch
 
 from vinl.config.errors import InputError
-from vinl.nav.config import EpisodeConfig, NavPpoConfig
+from vinl.nav.config import EpisodeConfig
 from vinl.nav.environment import NavEnvironment
+from vinl.nav.learning_config import NavPpoConfig
 from vinl.policies.places import VIEW
 from vinl.policies.velocity_range import VelocityRange
 

@@ -14,7 +14,8 @@ import torch
 from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
-from vinl.nav.config import NavConfig, NavPpoConfig
+from vinl.nav.config import NavConfig
+from vinl.nav.learning_config import NavPpoConfig
 from vinl.nav.recurrent_model import build_actor, load_critic, load_start, save_critic
 from vinl.nav.recurrent_ppo import count_guesses
 from vinl.nav.training import build_algorithm, make_card, separate

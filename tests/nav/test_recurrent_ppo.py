@@ -8,7 +8,7 @@ from torch import nn
 from two_processes import run_two
 
 from vinl.config.errors import InputError
-from vinl.nav.config import NavPpoConfig
+from vinl.nav.learning_config import NavPpoConfig
 from vinl.nav.recurrent_model import RecurrentActorCritic, RecurrentStorage
 from vinl.nav.recurrent_ppo import RecurrentPPO
 from vinl.policies.depth_memory import DepthMemory

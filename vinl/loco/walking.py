@@ -87,7 +87,7 @@ def go_on(
     view = FieldView(jnp, ground.map, frame, body.qpos)
     if planned:
         plan = plan_footholds(jnp, config, view if config.map else None, gait, velocity, command, feet)
-        gait = aim(jnp, config, gait, plan, velocity, command, feet, _FREEZE)
+        gait = aim(jnp, config, gait, plan, velocity, command, feet, freeze=_FREEZE)
 
     swing, fraction = swings(jnp, config, gait), swing_fraction(jnp, config, gait.period)[:, None]
     progress = gait.phases / fraction

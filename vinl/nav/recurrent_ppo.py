@@ -16,7 +16,8 @@ from tensordict import TensorDict
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
-from vinl.nav.config import NavConfig, NavPpoConfig
+from vinl.nav.config import NavConfig
+from vinl.nav.learning_config import NavPpoConfig
 from vinl.nav.recurrent_model import RecurrentActorCritic, RecurrentStorage
 from vinl.policies.nav_actor import NavActor
 from vinl.policies.places import VIEW
