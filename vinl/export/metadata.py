@@ -68,7 +68,7 @@ def explain_rows(table: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 _MISSING = {
     "as_is": "give pixels without a return as the far limit",
-    "fill": "give pixels without a return as 0: they are filled from their neighbours",
+    "fill": "give pixels without a return as 0: neighbours fill them, and what is beyond the far limit",
     "plane": "give pixels without a return as 0: the network is told where they are",
 }
 """What a robot's program has to do with pixels without a return, by ``Camera.missing``."""

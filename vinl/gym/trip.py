@@ -40,7 +40,7 @@ class Trip:
         steps: control steps of 0.02 s made.
         foot_steps: those in which a foot was on a block, a wall or furniture.
         touched_wall: whether the last control step touched a wall or furniture with any part.
-        geodesic_m: shortest way to the goal [m]; where none is known, the last one that was.
+        geodesic_m: shortest path to the goal [m]; where none is known, the last one that was.
         end: why the episode ended, one of ``records.END_REASONS``; empty while it goes on.
     """
 

@@ -85,7 +85,7 @@ def draw_episode(record: Any, trace: Any) -> str:
         f'<svg class="map {record.end_reason}" viewBox="{low[0]:.2f} {-high[1]:.2f} {width:.2f} {height:.2f}" '
         f'role="img"><path class="wall" d="{outline_boxes(solid.below(BODY_HEIGHT))}"/>'
         f'<path class="block" d="{outline_boxes(Blocks(np.asarray(trace.blocks, np.float64)).boxes())}"/>'
-        f'<path class="way" d="{outline_path(np.asarray(path))}"/>{lost}'
+        f'<path class="walked" d="{outline_path(np.asarray(path))}"/>{lost}'
         f'<circle class="start" cx="{sx:.2f}" cy="{-sy:.2f}" r="{LENGTH / 5:.2f}"/>'
         f'<circle class="goal" cx="{gx:.2f}" cy="{-gy:.2f}" r="{LENGTH / 2:.2f}"/></svg>'
     )

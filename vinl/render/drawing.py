@@ -97,7 +97,7 @@ def draw_map(plan: FloorPlan, episodes: Sequence[Episode], first: int, radius: f
         lost = "" if record.success else f'<path class="lost" d="{_cross(ex, ey)}"/>'
         parts.append(
             f'<g class="ep {record.end_reason}" id="e{first + k}" data-end="{record.time_s:.2f}"><path class="block" '
-            f'd="{outline_boxes(Blocks(trace.blocks).boxes())}"/><path class="way" d="{outline_path(trace.path)}"/>'
+            f'd="{outline_boxes(Blocks(trace.blocks).boxes())}"/><path class="walked" d="{outline_path(trace.path)}"/>'
             f"{marks}{lost}<title>episode {record.episode}, seed {record.seed}: {record.end_reason}, "
             f"{record.distance_m:.1f} m in {record.time_s:.0f} s</title></g>"
         )
