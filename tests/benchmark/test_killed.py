@@ -8,6 +8,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 from vinl.cli.app import main
 
 WORDS = (
@@ -22,6 +24,7 @@ def read(folder: str) -> dict:
     return data
 
 
+@pytest.mark.slow
 def test_killed_and_started_again() -> None:
     argv = ["eval", *OPTIONS, "--out", "killed", "--workers"]
     process = subprocess.Popen([sys.executable, "-m", "vinl.cli.app", *argv, "2"], stdout=subprocess.DEVNULL)

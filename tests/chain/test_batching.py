@@ -101,6 +101,7 @@ def test_those_not_asked_keep_their_memory_and_answer(student: DepthPolicy) -> N
     np.testing.assert_array_equal(some.act(vector, depth), expected)
 
 
+@pytest.mark.slow
 def test_episodes_do_not_depend_on_company(
     two_rooms: FloorPlan, student: DepthPolicy, guide: DepthPolicy, monkeypatch: pytest.MonkeyPatch
 ) -> None:

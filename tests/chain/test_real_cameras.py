@@ -86,6 +86,7 @@ def test_dead_reckoning_starts_right_and_drifts() -> None:
     np.testing.assert_allclose(believed[-1][:, 2], 0.3, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_oracle_knows_where_it_is_and_the_ideal_is_as_before(two_rooms: FloorPlan) -> None:
     config = EvaluationConfig(time_limit=2.0, min_distance=2.0)
     setups = draw_setups(two_rooms, draw_routes(two_rooms, 2, config), 0, CLUTTER["paper"], config)

@@ -105,6 +105,7 @@ def test_a_fall_is_no_crossing(standing: LocomotionPolicy, monkeypatch: pytest.M
     assert len(crossing.trace.qpos) * CONTROL_DT == pytest.approx(crossing.record.time_s)
 
 
+@pytest.mark.slow
 def test_same_numbers_from_two_processes(trotting: LocomotionPolicy) -> None:
     one, two = (compare_crossings([trotting], [0.1], speed=1.5, crossings=17, workers=w)[0] for w in (1, 2))
     assert one.records == two.records and one.aggregate == two.aggregate

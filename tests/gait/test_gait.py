@@ -171,6 +171,7 @@ def test_without_a_map_feet_come_down_on_the_bar() -> None:
     assert over.foot.all()
 
 
+@pytest.mark.slow
 def test_all_array_modules_agree() -> None:
     frame = GridFrame(-4.0, -4.0, 0.05, (161, 161))
     field, bar = flat_field(frame), Boxes(np.array([[0.5, 0.1, 0.4, 0.2, 2.0, 0.0, 0.1]]))

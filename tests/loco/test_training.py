@@ -34,7 +34,7 @@ def count_rows(folder: Path) -> int:
 @pytest.mark.slow
 def test_killed_and_resumed_ends_with_the_very_weights_of_a_run_never_stopped(tmp_path, small_overrides):
     straight, killed = tmp_path / "straight", tmp_path / "killed"
-    iterations = "iterations=40"
+    iterations = "iterations=16"
     # all in processes of their own: the number of threads, which others may have set here, decides the last bits
     subprocess.run([*TRAIN, "--out", str(straight), *small_overrides, iterations], check=True)
     command = [*TRAIN, "--out", str(killed), "--save-every", "0.001", *small_overrides, iterations]
@@ -45,16 +45,16 @@ def test_killed_and_resumed_ends_with_the_very_weights_of_a_run_never_stopped(tm
             time.sleep(0.01)
         process.send_signal(signal.SIGKILL)
     done = torch.load(killed / "checkpoint.pt", weights_only=True)["iteration"]
-    assert 3 <= done < 40
+    assert 3 <= done < 16
     subprocess.run([*TRAIN, "--resume", str(killed)], check=True)
     rows = [json.loads(line) for line in (killed / "metrics.jsonl").read_text().splitlines()]
-    assert [row["iteration"] for row in rows] == list(range(1, 41))
+    assert [row["iteration"] for row in rows] == list(range(1, 17))
     whole, parts = weights(straight), weights(killed)
     assert all(torch.equal(whole[name], parts[name]) for name in whole)
     policy = load_policy(killed)
     policy.reset(3)
     assert np.isfinite(policy.act(np.zeros((3, STEPPING_TABLE.size), np.float32))).all()
-    assert policy.card.samples == 40 * 8 * 4
+    assert policy.card.samples == 16 * 8 * 4
 
 
 def test_resume_of_no_run_is_refused(tmp_path, capsys):

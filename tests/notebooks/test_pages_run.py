@@ -12,7 +12,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 TAUGHT = [
     page for page in PAGES if page.stem in ("README", "index", "navigation", "robot") or page.stem.startswith("howto_")
 ]
-SLOW = {"howto_train"}  # its Python trains a navigator
+SLOW = {"README", "howto_floorplan", "howto_gymnasium", "howto_own_policy", "howto_train"}  # they walk, or train
 
 
 def find_code(page: Path) -> list[str]:
