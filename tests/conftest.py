@@ -75,7 +75,7 @@ def _processor() -> str:
 
 @pytest.fixture(autouse=True)
 def unchecked_where_slow(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Checks of array shapes make a walk 1.6 times as long: tests marked ``slow`` do without; faster ones call the same
+    """Checks of array shapes make a walk a fifth longer: tests marked ``slow`` do without; faster ones call the same
     functions with them."""
     jaxtyping.config.update("jaxtyping_disable", request.node.get_closest_marker("slow") is not None)
     yield
