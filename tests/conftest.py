@@ -12,13 +12,12 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 import hypothesis
-import jaxtyping
 import pytest
 from beartype import BeartypeConf, beartype
 from jaxtyping import install_import_hook
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     import mujoco
 
@@ -71,15 +70,6 @@ def _processor() -> str:
         else []
     )
     return hashlib.sha256("\n".join([platform.machine(), *flags]).encode()).hexdigest()[:12]
-
-
-@pytest.fixture(autouse=True)
-def unchecked_where_slow(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Checks of array shapes make a walk a fifth longer: tests marked ``slow`` do without; faster ones call the same
-    functions with them."""
-    jaxtyping.config.update("jaxtyping_disable", request.node.get_closest_marker("slow") is not None)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.fixture(autouse=True)

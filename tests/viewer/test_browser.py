@@ -50,7 +50,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 @contextmanager
 def served(*options: str) -> Iterator[str]:
-    """``vinl play`` in a process of its own; the address of its page."""
+    """``vinl play`` in a process of its own, which must not have complained in the end; the address of its page."""
     command = [sys.executable, "-m", "vinl.cli.app", "play", "--port", "0", *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         assert process.stdout is not None
@@ -65,6 +65,8 @@ def served(*options: str) -> Iterator[str]:
             raise AssertionError("".join(said))
         finally:
             process.terminate()
+            rest = process.stdout.read()
+            assert "Traceback" not in rest, rest  # what goes wrong in a thread of the server, no page shows
 
 
 @contextmanager
