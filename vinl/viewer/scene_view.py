@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any, Literal
 
 import mujoco
@@ -98,6 +99,7 @@ class SceneView:
         self._centre: np.ndarray | None = None
         self._bounds = np.array([[-5.0, -5.0], [5.0, 5.0]])  # of the plan, once there is one
         self.follows = True
+        self._moving = threading.Lock()  # visitors centre the plan while the scene is drawn
         self._frames = {name: scene.add_frame(f"/vinl/robot/{name}", show_axes=False) for name in self._shape.names}
         for k, body in enumerate(self._shape.bodies):
             colour = tuple(round(255 * c) for c in body.colour)
@@ -188,8 +190,9 @@ class SceneView:
     def centre_plan(self) -> None:
         """Stop following, the middle of the building in the middle."""
         middle = self._bounds.mean(0)
-        self.follows, self._centre = False, middle
-        self._root.position = (-middle[0], -middle[1], 0.0)
+        with self._moving:
+            self.follows, self._centre = False, middle
+            self._root.position = (-middle[0], -middle[1], 0.0)
 
     # ---- what is drawn ---------------------------------------------------------------------------------------------
 
@@ -242,7 +245,9 @@ class SceneView:
         for name, position, rotation in zip(self._shape.names, positions, rotations, strict=True):
             frame = self._frames[name]
             frame.position, frame.wxyz = position, _quaternion(rotation)
-        if self.follows:
+        with self._moving:
+            if not self.follows:
+                return
             at, before = qpos[:2], self._centre
             if before is None or np.linalg.norm(at - before) > 1.0:
                 before = at.copy()

@@ -97,11 +97,12 @@ _CAMERA, _FIELD = (-3.0, -2.2, 2.6), math.radians(50)
 
 class Viewer:
     """A session, started or not yet, in the browser, on a port of an address (port 0: any free one; ``0.0.0.0`` lets
-    other machines in), at ``url``. ``error`` is what ended the drawing, if anything did. Raises ``InputError`` if the
-    port is taken, or may not be used."""
+    other machines in), at ``url``. ``shown`` is the snapshot that was drawn last, ``error`` what ended the drawing, if
+    anything did. Raises ``InputError`` if the port is taken, or may not be used."""
 
     def __init__(self, session: Session, title: str, host: str = "127.0.0.1", port: int = 8080) -> None:
         self.session, self._closing = session, threading.Event()
+        self.shown: Snapshot | None = None
         self.error: BaseException | None = None
         self._server = open_server(host, port, title)
         shown = "localhost" if host in ("0.0.0.0", "127.0.0.1") else host
@@ -210,18 +211,17 @@ class Viewer:
             self.error = error
 
     def _draw(self) -> None:
-        shown: Snapshot | None = None
         told, noticed = 0.0, self.session.snapshot.notice[0]
         while not self._closing.is_set():
             snapshot = self.session.snapshot
             now = time.perf_counter()
-            if snapshot is not shown:
+            if snapshot is not self.shown:
                 with self._server.atomic():
                     self.scene.draw(snapshot)
                     if now - told > 1 / TEXT_RATE or snapshot.paused:
                         self._tell(snapshot)
                         told = now
-                shown = snapshot
+                self.shown = snapshot
             if snapshot.notice[0] != noticed:
                 noticed = snapshot.notice[0]
                 for client in self._server.get_clients().values():
