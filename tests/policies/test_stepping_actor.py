@@ -97,6 +97,17 @@ def test_told_the_truth_it_walks_as_one_that_has_the_map() -> None:
     assert max(shifts) > 0.1  # the bar was in the way
 
 
+def test_only_the_command_changes_before_a_block() -> None:
+    network, command = blind(), np.tile([0.3, 0.0, 0.1], (N, 1))
+    vector = sensed(poses(np.random.default_rng(4), 0.0), np.zeros((N, 3)), command)
+    heights = torch.zeros(N, len(POINTS))
+    torch.testing.assert_close(network.hurry(vector, heights), vector)
+    heights[0, (POINTS[:, 0] > 0.4) & (POINTS[:, 0] < 0.65)] = 0.1
+    walked = network.hurry(vector, heights)
+    torch.testing.assert_close(network.feel(walked)["command"][0], torch.tensor([0.5, 0.0, 0.1]))
+    assert (walked != vector).sum() == 1
+
+
 def test_steps_in_a_row_are_the_same_as_one_by_one_and_fresh_robots_forget() -> None:
     network, rng = blind(), np.random.default_rng(2)
     command = np.tile([0.4, 0.0, 0.0], (N, 1))
