@@ -48,7 +48,7 @@ def test_a_robot_hurries_over_its_own_clutter_alone(room: FloorPlan) -> None:
     bar = Blocks(np.array([[0.75, 0.0, np.pi / 2, 1.0, 0.2, 0.1]]))
     reader = GaitReader(GaitConfig(), map_plan(room, [bar, Blocks.empty()]))
     qpos, slow = np.tile(home_qpos(0.2, 0.0, 0.38, 0.0), (2, 1)), np.tile([0.3, 0.0, 0.2], (2, 1))
-    np.testing.assert_allclose(reader.hurry(qpos, slow), [[0.5, 0.0, 0.2], [0.3, 0.0, 0.2]])
+    np.testing.assert_allclose(reader.adapt(qpos, slow), [[0.5, 0.0, 0.2], [0.3, 0.0, 0.2]])
 
 
 def test_a_robot_that_starts_anew_begins_its_gait_anew(room: FloorPlan) -> None:

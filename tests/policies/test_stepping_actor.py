@@ -101,9 +101,9 @@ def test_only_the_command_changes_before_a_block() -> None:
     network, command = blind(), np.tile([0.3, 0.0, 0.1], (N, 1))
     vector = sensed(poses(np.random.default_rng(4), 0.0), np.zeros((N, 3)), command)
     heights = torch.zeros(N, len(POINTS))
-    torch.testing.assert_close(network.hurry(vector, heights), vector)
+    torch.testing.assert_close(network.adapt(vector, heights), vector)
     heights[0, (POINTS[:, 0] > 0.4) & (POINTS[:, 0] < 0.65)] = 0.1
-    walked = network.hurry(vector, heights)
+    walked = network.adapt(vector, heights)
     torch.testing.assert_close(network.feel(walked)["command"][0], torch.tensor([0.5, 0.0, 0.1]))
     assert (walked != vector).sum() == 1
 

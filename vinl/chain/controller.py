@@ -84,7 +84,7 @@ class LocomotionController:
             InputError: the policy's answer is none.
         """
         if self._gait is not None:
-            command = self._gait.hurry(qpos, command)
+            command = self._gait.adapt(qpos, command)
         observation = observe(np, qpos, qvel, command, self.actions)[:, self._first :]
         if self._gait is not None:
             observation = insert_gait(np, observation, self._gait.read(qpos, qvel, command))

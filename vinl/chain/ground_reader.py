@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from vinl.gait.command import adapt_command
 from vinl.gait.config import GaitConfig
-from vinl.gait.crossing import crossing_command
 from vinl.gait.footholds import plan_footholds
 from vinl.gait.ground_view import FieldView, GroundMap, build_ground_map
 from vinl.gait.observation import GAIT_ROWS
@@ -133,10 +133,10 @@ class GaitReader:
         """Go on with the gaits of the same robots on another map."""
         self.gait, self._last, self._fresh = before.gait, before._last, before._fresh
 
-    def hurry(self, qpos: Float[np.ndarray, "n 19"], command: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-        """The command that blocks are crossed by, see ``crossing_command``."""
+    def adapt(self, qpos: Float[np.ndarray, "n 19"], command: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+        """The command that robots walk by, see ``adapt_command``."""
         view, feet = self._maps.view(qpos), feet_in_heading_frame(np, qpos)
-        return crossing_command(np, self.config, view, command, feet)
+        return adapt_command(np, self.config, view, command, feet)
 
     def read(
         self, qpos: Float[np.ndarray, "n 19"], qvel: Float[np.ndarray, "n 18"], command: Float[np.ndarray, "n 3"]

@@ -15,8 +15,8 @@ from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
 from vinl.config.loader import build_config
+from vinl.gait.command import adapt_command
 from vinl.gait.config import GaitConfig
-from vinl.gait.crossing import crossing_command
 from vinl.gait.footholds import plan_footholds
 from vinl.gait.local_map import POINTS, LocalMapView, floor_under
 from vinl.gait.observation import GAIT_ROWS, SENSED_TABLE, STEPPING_TABLE
@@ -205,11 +205,11 @@ class SteppingActor(PolicyNetwork):
             map_ = self.elevation.forget(map_, fresh if self.remembers else torch.ones_like(fresh))
         return Memory(memory.network, gait, torch.where(fresh[:, None], 0.0, memory.velocity), map_)
 
-    def hurry(self, vector: Float[Tensor, "n 45"], heights: Float[Tensor, "n 741"]) -> Float[Tensor, "n 45"]:
-        """The same numbers with the command that blocks are crossed by; trainings walk as they are told."""
+    def adapt(self, vector: Float[Tensor, "n 45"], heights: Float[Tensor, "n 741"]) -> Float[Tensor, "n 45"]:
+        """The same numbers with the command of ``adapt_command``; trainings walk as they are told."""
         felt, _, feet = self.stance(vector)
         view = LocalMapView(torch, heights, floor_under(torch, feet))
-        command = crossing_command(torch, self.gait, view, felt["command"], feet)
+        command = adapt_command(torch, self.gait, view, felt["command"], feet)
         scaled = command * self.sensed_scale[_COMMAND]
         return torch.cat([vector[:, : _COMMAND.start], scaled, vector[:, _COMMAND.stop :]], 1)
 
@@ -253,7 +253,7 @@ class SteppingActor(PolicyNetwork):
             inputs = self.network_input(vector[k], memory)[None]
             velocity, network = self.estimate(inputs, memory.network, fresh[k : k + 1])
             heights, map_ = self.survey(None if depth is None else depth[k], vector[k], velocity[0], memory)
-            action, gait = self.walk(self.hurry(vector[k], heights), Prediction(velocity[0], heights), memory)
+            action, gait = self.walk(self.adapt(vector[k], heights), Prediction(velocity[0], heights), memory)
             actions.append(action)
             state = self.pack(Memory(network, gait, velocity[0], map_))
         return torch.stack(actions), state

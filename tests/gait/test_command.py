@@ -1,4 +1,4 @@
-"""Blocks are crossed at half a metre a second at least, unless there is a wall ahead."""
+"""Blocks are crossed at half a metre a second at least, and robots stop before walls."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import torch
 
+from vinl.gait.command import CROSSING_SPEED, adapt_command
 from vinl.gait.config import GaitConfig
-from vinl.gait.crossing import CROSSING_SPEED, crossing_command
 from vinl.gait.ground_view import FieldView, build_ground_map
 from vinl.gait.local_map import POINTS, LocalMapView
 from vinl.gait.state import feet_in_heading_frame
@@ -21,9 +21,11 @@ FRAME = GridFrame(-4.0, -4.0, 0.05, (161, 161))
 BAR, LATER, PASSED = (([x, 0.0, 0.0, 0.2, 1.0, 0.0, 0.1],) for x in (0.5, 1.2, -0.8))
 BESIDE = ([0.5, 0.5, 0.0, 0.2, 0.2, 0.0, 0.1],)
 WALL, WALLS_BESIDE = ([0.9, 0.0, 0.0, 0.1, 2.0, 0.0, 2.5],), ([0.5, 0.35, 0.0, 2.0, 0.1, 0.0, 2.5],)
+NARROW = tuple([0.45, y, 0.0, 0.15, 0.2, 0.0, 0.6] for y in (-0.23, 0.23))  # 0.26 m between a sofa and a cabinet
+DOOR = tuple([0.45, y, 0.0, 0.15, 0.4, 0.0, 2.5] for y in (-0.55, 0.55))  # 0.7 m wide
 
 
-def crossing(boxes, command, xp=np, convert=np.asarray, config=CONFIG) -> np.ndarray:
+def walked_by(boxes, command, xp=np, convert=np.asarray, config=CONFIG) -> np.ndarray:
     """The command of a robot in the middle of the world, by its map."""
     field, boxes = flat_field(FRAME), Boxes(np.array(boxes).reshape(-1, 7))
     raise_boxes(field, Boxes(boxes.rows[boxes.rows[:, 6] < 0.5]), BLOCK)
@@ -32,7 +34,7 @@ def crossing(boxes, command, xp=np, convert=np.asarray, config=CONFIG) -> np.nda
     view = FieldView(xp, type(ground)(*map(convert, ground)), FRAME, convert(qpos))
     feet = feet_in_heading_frame(np, qpos)
     asked = np.array([command], np.float32)
-    return np.asarray(crossing_command(xp, config, view, convert(asked), convert(feet)))[0]
+    return np.asarray(adapt_command(xp, config, view, convert(asked), convert(feet)))[0]
 
 
 @pytest.mark.parametrize("kind", ["numpy", "jax"])
@@ -50,26 +52,29 @@ def crossing(boxes, command, xp=np, convert=np.asarray, config=CONFIG) -> np.nda
         (PASSED, 0.3, 0.3),
         (BESIDE, 0.3, 0.3),
         (WALLS_BESIDE, 0.3, 0.3),
+        (NARROW, 0.7, 0.0),
+        (NARROW, -0.2, -0.2),
+        (DOOR, 0.7, 0.7),
     ],
 )
-def test_slow_commands_are_raised_over_blocks(boxes, forward, walked, kind):
+def test_commands_are_raised_over_blocks_and_end_before_walls(boxes, forward, walked, kind):
     xp, convert = {"numpy": (np, np.asarray), "jax": (jnp, jnp.asarray)}[kind]
-    np.testing.assert_allclose(crossing(boxes, (forward, 0.1, -0.4), xp, convert), (walked, 0.1, -0.4), atol=1e-6)
+    np.testing.assert_allclose(walked_by(boxes, (forward, 0.1, -0.4), xp, convert), (walked, 0.1, -0.4), atol=1e-6)
 
 
 def test_without_a_map_commands_stay():
     command = (0.3, 0.0, 0.2)
-    np.testing.assert_allclose(crossing(BAR, command, config=GaitConfig(map=False)), command)
+    np.testing.assert_allclose(walked_by(BAR, command, config=GaitConfig(map=False)), command)
     feet = feet_in_heading_frame(np, home_qpos(0.0, 0.0, 0.38, 0.0)[None])
-    np.testing.assert_allclose(crossing_command(np, GaitConfig(), None, np.array([command]), feet), [command])
+    np.testing.assert_allclose(adapt_command(np, GaitConfig(), None, np.array([command]), feet), [command])
 
 
-@pytest.mark.parametrize(("height", "walked"), [(0.03, CROSSING_SPEED), (0.2, CROSSING_SPEED), (0.02, 0.3), (0.5, 0.3)])
+@pytest.mark.parametrize(("height", "walked"), [(0.03, CROSSING_SPEED), (0.2, CROSSING_SPEED), (0.02, 0.3), (0.5, 0.0)])
 def test_a_map_from_images_tells_blocks_from_floor_and_walls(height, walked):
     feet = feet_in_heading_frame(np, home_qpos(0.0, 0.0, 0.38, 0.0)[None])
-    heights = np.where((POINTS[:, 0] > 0.4) & (POINTS[:, 0] < 0.62), height, 0.0)[None]
+    heights = np.where((POINTS[:, 0] > 0.36) & (POINTS[:, 0] < 0.62), height, 0.0)[None]
     asked, floor = np.array([[0.3, 0.0, 0.0]]), np.full(1, feet[..., 2].min() - FOOT_RADIUS)
     for xp, convert in ((np, np.asarray), (torch, torch.as_tensor)):
         view = LocalMapView(xp, convert(heights), convert(floor))
-        command = crossing_command(xp, CONFIG, view, convert(asked), convert(feet))
+        command = adapt_command(xp, CONFIG, view, convert(asked), convert(feet))
         assert float(command[0, 0]) == pytest.approx(walked)

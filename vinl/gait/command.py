@@ -1,4 +1,5 @@
-"""How fast a block is crossed, whatever slower is commanded. For numpy, jax.numpy and torch alike (``xp``)."""
+"""The command that a robot walks by: blocks are crossed quickly, and nobody walks into a wall. For numpy, jax.numpy and
+torch alike (``xp``)."""
 
 from __future__ import annotations
 
@@ -19,37 +20,44 @@ LEAST = 0.1
 """Commands below this are not raised [m/s]: the robot is to stand, or to turn on the spot."""
 
 
-def _grid(ahead: tuple[float, float], aside: float) -> np.ndarray:
-    x, y = np.arange(ahead[0], ahead[1] + 0.01, 0.1), np.arange(-aside, aside + 0.01, 0.1)
+def _grid(ahead: tuple[float, float, float], aside: tuple[float, float]) -> np.ndarray:
+    """Places from the nearest to the farthest and from the right to the left of the middle, so far apart [m]."""
+    x, y = np.arange(ahead[0], ahead[1] + 0.01, ahead[2]), np.arange(-aside[0], aside[0] + 0.01, aside[1])
     return np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2).astype(np.float32)
 
 
-UNDER = _grid((-0.45, 0.75), 0.2)
+UNDER = _grid((-0.45, 0.75, 0.1), (0.2, 0.1))
 """(65, 2) where a block counts [m]: from the rear feet to the front feet's next footholds."""
 
-AHEAD = _grid((0.35, 0.95), 0.2)
+AHEAD = _grid((0.35, 0.95, 0.1), (0.2, 0.1))
 """(35, 2) where a wall forbids to go faster [m]."""
 
+NOSE = _grid((0.36, 0.41, 0.05), (0.14, 0.07))
+"""(10, 2) where a wall forbids to go on [m]: 3 to 9 cm before the trunk, which ends 0.325 m ahead of its middle, and
+nearly as wide."""
 
-def crossing_command(xp: Any, config: GaitConfig, view: GroundView | None, command: Any, feet: Any) -> Any:
-    """(n, 3) the command that robots walk by: over blocks at ``CROSSING_SPEED`` at least, unless a wall is ahead.
+
+def adapt_command(xp: Any, config: GaitConfig, view: GroundView | None, command: Any, feet: Any) -> Any:
+    """(n, 3) the command that robots walk by: over blocks at ``CROSSING_SPEED`` at least, and not on into a wall.
+
+    A wall is what stands higher than ``WALL`` over the floor, furniture too. A robot before one can turn on the spot.
 
     Args:
         xp: ``numpy``, ``jax.numpy`` or ``torch``.
-        config: of the gait; without ``map`` nothing is known of blocks.
+        config: of the gait; without ``map`` nothing is known of blocks and walls.
         view: the ground; None: level, and nothing on it.
         command: (n, 3) forward, left [m/s], yaw rate [rad/s].
         feet: (n, 4, 3) middles of the feet in the heading frame [m].
     """
     if view is None or not config.map:
         return command
-    floor = floor_under(xp, feet)
+    floor, forward = floor_under(xp, feet), command[:, 0]
     low, high = (_clearance(xp, view, UNDER, floor + z) for z in (SOLID, WALL))
-    wall = xp.amin(_clearance(xp, view, AHEAD, floor + WALL), -1) < 0
     over = ((low < 0) & (high >= 0)).any(-1)
-    forward = command[:, 0]
+    wall, stop = ((_clearance(xp, view, where, floor + WALL) < 0).any(-1) for where in (AHEAD, NOSE))
     hurries = over & ~wall & (forward > LEAST) & (forward < CROSSING_SPEED)
     forward = xp.where(hurries, 0 * forward + CROSSING_SPEED, forward)
+    forward = xp.where(stop, xp.clip(forward, None, 0.0), forward)
     return xp.concatenate([forward[:, None], command[:, 1:]], -1)
 
 
