@@ -3,6 +3,7 @@
 In every control step, after the robot has moved::
 
     feet = feet_in_heading_frame(xp, qpos)
+    command = adapt_command(xp, config, view, command, feet)                       # not in training
     gait = tick(xp, config, gait, motion, command, feet)                           # clocks run, feet lift off
     plan = plan_footholds(xp, config, view, gait, velocity, command, feet)         # from a map, or by a network
     gait = aim(xp, config, gait, plan, velocity, command, feet)                    # feet have a target
