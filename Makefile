@@ -20,7 +20,7 @@ demo: install
 PLANS ?= $(shell $(BIN)/python -c "import vinl; print(*vinl.shipped_floorplans()[:2])" 2>/dev/null)
 
 test: install-dev
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 fuzz: install-dev
 	$(BIN)/python tests/fuzz/fuzz.py

@@ -30,6 +30,8 @@ from vinl.robot.aliengo import ACTION_SCALE
 from vinl.robot.observation import observe
 from vinl.world.boxes import Blocks
 
+pytestmark = pytest.mark.slow
+
 ID, PLAN = "vinl/Home-v0", "harbour_flat"
 NEAR = EvaluationConfig(min_distance=2.0)
 

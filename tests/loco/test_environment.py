@@ -18,6 +18,8 @@ from vinl.sensing.height_scan import scan_ground
 from vinl.world.boxes import Boxes
 from vinl.world.grid import BLOCK, WALL, GridFrame, flat_field, raise_boxes
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def env(small_config):

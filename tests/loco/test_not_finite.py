@@ -21,6 +21,8 @@ from vinl.rl.nan_guard import NotFiniteError, judge_losses
 from vinl.rl.run_folder import MAX_LOST, RunFolder
 from vinl.robot.aliengo import DEFAULT_POSE
 
+pytestmark = pytest.mark.slow
+
 STAGE2 = ["num_envs=8", *BLOCK_TILES, "ppo.steps=4", "ppo.critic_warmup=1", "terrain.block_density=0.1"]
 
 

@@ -34,6 +34,8 @@ from vinl.robot.aliengo import DEFAULT_POSE, FOOT_GEOMS, foot_positions, home_qp
 from vinl.robot.model import robot_spec
 from vinl.world.terrain import TILE, build_terrain
 
+pytestmark = pytest.mark.slow
+
 SMALL = [
     "num_envs=16",
     *BLOCK_TILES,

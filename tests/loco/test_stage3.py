@@ -28,6 +28,8 @@ from vinl.policies.io import load_policy, save_policy
 from vinl.policies.networks import StepActor
 from vinl.rl.stopwatch import Stopwatch
 
+pytestmark = pytest.mark.slow
+
 SMALL = ["num_envs=16", *BLOCK_TILES, *SMALL_STUDENT]
 
 

@@ -17,6 +17,8 @@ from vinl.chain import workers
 from vinl.config.errors import InputError
 from vinl.notebook.walk import cut_episode
 
+pytestmark = pytest.mark.slow
+
 PLAN = "harbour_flat"
 SHORT = vinl.EvaluationConfig(time_limit=2.0, min_distance=2.0)
 
