@@ -1,5 +1,4 @@
-"""The command that a robot walks by: blocks are crossed quickly, and nobody walks into a wall. For numpy, jax.numpy and
-torch alike (``xp``)."""
+"""The command that a robot walks by: blocks are crossed quickly. For numpy, jax.numpy and torch alike (``xp``)."""
 
 from __future__ import annotations
 
@@ -32,19 +31,15 @@ UNDER = _grid((-0.45, 0.75, 0.1), (0.2, 0.1))
 AHEAD = _grid((0.35, 0.95, 0.1), (0.2, 0.1))
 """(35, 2) where a wall forbids to go faster [m]."""
 
-NOSE = _grid((0.36, 0.41, 0.05), (0.14, 0.07))
-"""(10, 2) where a wall forbids to go on [m]: 3 to 9 cm before the trunk, which ends 0.325 m ahead of its middle, and
-nearly as wide."""
-
 
 def adapt_command(xp: Any, config: GaitConfig, view: GroundView | None, command: Any, feet: Any) -> Any:
-    """(n, 3) the command that robots walk by: over blocks at ``CROSSING_SPEED`` at least, and not on into a wall.
+    """(n, 3) the command that robots walk by: over blocks at ``CROSSING_SPEED`` at least, unless a wall is ahead.
 
-    A wall is what stands higher than ``WALL`` over the floor, furniture too. A robot before one can turn on the spot.
+    A wall is what stands higher than ``WALL`` over the floor, furniture too.
 
     Args:
         xp: ``numpy``, ``jax.numpy`` or ``torch``.
-        config: of the gait; without ``map`` nothing is known of blocks and walls.
+        config: of the gait; without ``map`` nothing is known of blocks.
         view: the ground; None: level, and nothing on it.
         command: (n, 3) forward, left [m/s], yaw rate [rad/s].
         feet: (n, 4, 3) middles of the feet in the heading frame [m].
@@ -54,10 +49,9 @@ def adapt_command(xp: Any, config: GaitConfig, view: GroundView | None, command:
     floor, forward = floor_under(xp, feet), command[:, 0]
     low, high = (_clearance(xp, view, UNDER, floor + z) for z in (SOLID, WALL))
     over = ((low < 0) & (high >= 0)).any(-1)
-    wall, stop = ((_clearance(xp, view, where, floor + WALL) < 0).any(-1) for where in (AHEAD, NOSE))
+    wall = (_clearance(xp, view, AHEAD, floor + WALL) < 0).any(-1)
     hurries = over & ~wall & (forward > LEAST) & (forward < CROSSING_SPEED)
     forward = xp.where(hurries, 0 * forward + CROSSING_SPEED, forward)
-    forward = xp.where(stop, xp.clip(forward, None, 0.0), forward)
     return xp.concatenate([forward[:, None], command[:, 1:]], -1)
 
 
