@@ -97,15 +97,19 @@ def test_told_the_truth_it_walks_as_one_that_has_the_map() -> None:
     assert max(shifts) > 0.1  # the bar was in the way
 
 
-def test_only_the_command_changes_before_a_block() -> None:
-    network, command = blind(), np.tile([0.3, 0.0, 0.1], (N, 1))
-    vector = sensed(poses(np.random.default_rng(4), 0.0), np.zeros((N, 3)), command)
-    heights = torch.zeros(N, len(POINTS))
-    torch.testing.assert_close(network.adapt(vector, heights), vector)
+def test_slow_commands_are_raised_before_a_block_but_not_in_training() -> None:
+    network, still, heights = blind(), torch.zeros(N, 3), torch.zeros(N, len(POINTS))
     heights[0, (POINTS[:, 0] > 0.4) & (POINTS[:, 0] < 0.65)] = 0.1
-    walked = network.adapt(vector, heights)
-    torch.testing.assert_close(network.feel(walked)["command"][0], torch.tensor([0.5, 0.0, 0.1]))
-    assert (walked != vector).sum() == 1
+
+    def act(forward: float, adapt: bool) -> torch.Tensor:
+        vector = sensed(poses(np.random.default_rng(4), 0.0), np.zeros((N, 3)), np.tile([forward, 0.0, 0.1], (N, 1)))
+        memory = network.begin(vector, network.unpack(network.initial_state(N)), torch.ones(N, dtype=torch.bool))
+        return network.walk(vector, Prediction(still, heights), memory, adapt)[0]
+
+    slow, fast, adapted = act(0.3, False), act(0.5, False), act(0.3, True)
+    torch.testing.assert_close(adapted[0], fast[0])
+    torch.testing.assert_close(adapted[1:], slow[1:])
+    assert not torch.allclose(slow[0], fast[0])
 
 
 def test_steps_in_a_row_are_the_same_as_one_by_one_and_fresh_robots_forget() -> None:

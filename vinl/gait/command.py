@@ -19,17 +19,24 @@ LEAST = 0.1
 """Commands below this are not raised [m/s]: the robot is to stand, or to turn on the spot."""
 
 
-def _grid(ahead: tuple[float, float, float], aside: tuple[float, float]) -> np.ndarray:
-    """Places from the nearest to the farthest and from the right to the left of the middle, so far apart [m]."""
-    x, y = np.arange(ahead[0], ahead[1] + 0.01, ahead[2]), np.arange(-aside[0], aside[0] + 0.01, aside[1])
+def _grid(first: float, last: float) -> np.ndarray:
+    """Places 0.1 m apart, from behind to ahead and 0.2 m to both sides [m]."""
+    x, y = np.arange(first, last + 0.01, 0.1), np.arange(-0.2, 0.21, 0.1)
     return np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2).astype(np.float32)
 
 
-UNDER = _grid((-0.45, 0.75, 0.1), (0.2, 0.1))
+UNDER = _grid(-0.45, 0.75)
 """(65, 2) where a block counts [m]: from the rear feet to the front feet's next footholds."""
 
-AHEAD = _grid((0.35, 0.95, 0.1), (0.2, 0.1))
+AHEAD = _grid(0.35, 0.95)
 """(35, 2) where a wall forbids to go faster [m]."""
+
+_POINTS = np.concatenate([np.insert(xy, 2, z, 1) for xy, z in ((UNDER, SOLID), (UNDER, WALL), (AHEAD, WALL))]).astype(
+    np.float32
+)
+"""(165, 3) all that is asked of the map, above the floor: in one go, for a robot's computer is slow to begin each."""
+
+_PARTS = slice(0, len(UNDER)), slice(len(UNDER), 2 * len(UNDER)), slice(2 * len(UNDER), None)
 
 
 def adapt_command(xp: Any, config: GaitConfig, view: GroundView | None, command: Any, feet: Any) -> Any:
@@ -47,15 +54,10 @@ def adapt_command(xp: Any, config: GaitConfig, view: GroundView | None, command:
     if view is None or not config.map:
         return command
     floor, forward = floor_under(xp, feet), command[:, 0]
-    low, high = (_clearance(xp, view, UNDER, floor + z) for z in (SOLID, WALL))
-    over = ((low < 0) & (high >= 0)).any(-1)
-    wall = (_clearance(xp, view, AHEAD, floor + WALL) < 0).any(-1)
+    points = constant(xp, _POINTS, command) + 0 * command[:, None, :1]
+    inside = view.clearance(xp.concatenate([points[..., :2], points[..., 2:] + floor[:, None, None]], -1)) < 0
+    low, high, ahead = (inside[:, part] for part in _PARTS)
+    over, wall = (low & ~high).any(-1), ahead.any(-1)
     hurries = over & ~wall & (forward > LEAST) & (forward < CROSSING_SPEED)
     forward = xp.where(hurries, 0 * forward + CROSSING_SPEED, forward)
     return xp.concatenate([forward[:, None], command[:, 1:]], -1)
-
-
-def _clearance(xp: Any, view: GroundView, places: np.ndarray, z: Any) -> Any:
-    """(n, k) at k places and heights (n,) in the heading frame [m]."""
-    xy = constant(xp, places, z) + 0 * z[:, None, None]
-    return view.clearance(xp.concatenate([xy, z[:, None, None] + 0 * xy[..., :1]], -1))

@@ -131,22 +131,18 @@ class LocalMapView:
         """(n, rows, columns) distance from the edge of the nearest obstacle, negative inside, and its height [m]."""
         xp, reach = self._xp, round(_FAR / CELL)
         solid = grid > SOLID
-        square_out, square_in = (
-            xp.where(solid, a, b * 1.0) for a, b in ((0 * grid, 0 * grid + 9), (0 * grid + 9, 0 * grid))
-        )
-        squares = []
-        for square in (square_out, square_in):  # exact squared distances to cells, one axis after the other
-            for axis in (0, 1):
-                best = square
-                for k in range(1, reach + 1):
-                    for step in (-k, k):
-                        moved = self._shifted(square, *((step, 0) if axis == 0 else (0, step)), 9.0)
-                        best = xp.minimum(best, moved + (k * CELL) ** 2)
-                square = best
-            squares.append(xp.sqrt(square))
-        distance = xp.clip(
-            squares[0] - squares[1] - xp.where(solid, -CELL / 2 + 0 * grid, CELL / 2 + 0 * grid), -_FAR, _FAR
-        )
+        nothing, far = 0 * grid, 0 * grid + 9.0
+        # from the nearest obstacle and to the nearest floor, in one go
+        square = xp.concatenate([xp.where(solid, nothing, far), xp.where(solid, far, nothing)], 0)
+        for axis in (0, 1):  # exact squared distances to cells, one axis after the other
+            best = square
+            for k in range(1, reach + 1):
+                for step in (-k, k):
+                    moved = self._shifted(square, *((step, 0) if axis == 0 else (0, step)), 9.0)
+                    best = xp.minimum(best, moved + (k * CELL) ** 2)
+            square = best
+        outside, inside = xp.sqrt(square[: len(grid)]), xp.sqrt(square[len(grid) :])
+        distance = xp.clip(outside - inside - xp.where(solid, nothing - CELL / 2, nothing + CELL / 2), -_FAR, _FAR)
         top = xp.where(solid, grid, 0 * grid)
         for axis in (0, 1):
             spread = [(k, 0) if axis == 0 else (0, k) for k in range(-_TOP_CELLS, _TOP_CELLS + 1) if k]

@@ -205,24 +205,20 @@ class SteppingActor(PolicyNetwork):
             map_ = self.elevation.forget(map_, fresh if self.remembers else torch.ones_like(fresh))
         return Memory(memory.network, gait, torch.where(fresh[:, None], 0.0, memory.velocity), map_)
 
-    def adapt(self, vector: Float[Tensor, "n 45"], heights: Float[Tensor, "n 741"]) -> Float[Tensor, "n 45"]:
-        """The same numbers with the command of ``adapt_command``; trainings walk as they are told."""
-        felt, _, feet = self.stance(vector)
-        view = LocalMapView(torch, heights, floor_under(torch, feet))
-        command = adapt_command(torch, self.gait, view, felt["command"], feet)
-        scaled = command * self.sensed_scale[_COMMAND]
-        return torch.cat([vector[:, : _COMMAND.start], scaled, vector[:, _COMMAND.stop :]], 1)
-
     def walk(
-        self, vector: Float[Tensor, "n 45"], said: Prediction, memory: Memory
+        self, vector: Float[Tensor, "n 45"], said: Prediction, memory: Memory, adapt: bool = False
     ) -> tuple[Float[Tensor, "n 12"], GaitState]:
-        """Actions of what is believed, or known to be right, and the gait after them."""
+        """Actions of what is believed, or known to be right, and the gait after them; ``adapt``: by the command of
+        ``adapt_command``. Trainings walk as they are told."""
         felt, axes, feet = self.stance(vector)
-        command = felt["command"]
+        view, command = LocalMapView(torch, said.heights, floor_under(torch, feet)), felt["command"]
+        if adapt:
+            command = adapt_command(torch, self.gait, view, command, feet)
+            scaled = command * self.sensed_scale[_COMMAND]
+            vector = torch.cat([vector[:, : _COMMAND.start], scaled, vector[:, _COMMAND.stop :]], 1)
         motion = motion_of(torch, axes, said.velocity, felt["base_angular_velocity"])
         level = into_heading_frame(axes, said.velocity)[:, :2]
         gait = tick(torch, self.gait, memory.gait, motion, command, feet)
-        view = LocalMapView(torch, said.heights, floor_under(torch, feet))
         plan = plan_footholds(torch, self.gait, view, gait, level, command, feet)
         gait = aim(torch, self.gait, gait, plan, level, command, feet)
         rows = gait_rows(torch, self.gait, gait, feet) * self.rows_scale
@@ -253,7 +249,7 @@ class SteppingActor(PolicyNetwork):
             inputs = self.network_input(vector[k], memory)[None]
             velocity, network = self.estimate(inputs, memory.network, fresh[k : k + 1])
             heights, map_ = self.survey(None if depth is None else depth[k], vector[k], velocity[0], memory)
-            action, gait = self.walk(self.adapt(vector[k], heights), Prediction(velocity[0], heights), memory)
+            action, gait = self.walk(vector[k], Prediction(velocity[0], heights), memory, adapt=True)
             actions.append(action)
             state = self.pack(Memory(network, gait, velocity[0], map_))
         return torch.stack(actions), state
