@@ -149,7 +149,7 @@ def test_joints_walk_the_episode_that_evaluate_walks(monkeypatch: pytest.MonkeyP
     np.testing.assert_array_equal(observation["height_scan"], wanted.astype(np.float32))
     out, k = False, 0
     while not out:
-        rows = reader.read(trip.qpos, trip.qvel, env._command)
+        _, rows = reader.read(trip.qpos, trip.qvel, env._command)
         action = legs.act(insert_gait(np, observation["proprioception"][None], rows))[0]
         np.testing.assert_array_equal(action, asked[k][0])
         observation, _, over, out, info = env.step(action / np.float32(16))

@@ -74,7 +74,9 @@ def test_told_the_truth_it_walks_as_one_that_has_the_map() -> None:
         axes, feet = heading_axes(np, gravity), feet_in_heading_frame(np, qpos)
         if memory is None or gait is None:
             gait = start_gait(np, config, feet)
-            memory = network.begin(vector, network.unpack(network.initial_state(N)), torch.ones(N, dtype=torch.bool))
+            memory = network.begin(
+                network.stance(vector), network.unpack(network.initial_state(N)), torch.ones(N, dtype=torch.bool)
+            )
         level = into_heading_frame(axes, velocity)[:, :2]
         gait = tick(np, config, gait, motion_of(np, axes, velocity, turning), command, feet)
         view = FieldView(np, ground, frame, qpos)
@@ -86,7 +88,7 @@ def test_told_the_truth_it_walks_as_one_that_has_the_map() -> None:
             torch.from_numpy(velocity).float(),
             torch.from_numpy(view.height(np.broadcast_to(POINTS, (N, *POINTS.shape))) + qpos[:, 2:3]).float(),
         )
-        action, new = network.walk(vector, said, memory)
+        action, new = network.walk(vector, network.stance(vector), said, memory)
         memory = Memory(memory.network, new, said.velocity, None)
         # heights on cells of 5 cm are not the distances that the world's map has
         assert np.median(np.abs(new.target.numpy() - gait.target)[..., :2]) < 0.03
@@ -103,8 +105,9 @@ def test_slow_commands_are_raised_before_a_block_but_not_in_training() -> None:
 
     def act(forward: float, adapt: bool) -> torch.Tensor:
         vector = sensed(poses(np.random.default_rng(4), 0.0), np.zeros((N, 3)), np.tile([forward, 0.0, 0.1], (N, 1)))
-        memory = network.begin(vector, network.unpack(network.initial_state(N)), torch.ones(N, dtype=torch.bool))
-        return network.walk(vector, Prediction(still, heights), memory, adapt)[0]
+        stance, state = network.stance(vector), network.unpack(network.initial_state(N))
+        memory = network.begin(stance, state, torch.ones(N, dtype=torch.bool))
+        return network.walk(vector, stance, Prediction(still, heights), memory, adapt)[0]
 
     slow, fast, adapted = act(0.3, False), act(0.5, False), act(0.3, True)
     torch.testing.assert_close(adapted[0], fast[0])
@@ -135,10 +138,11 @@ def test_steps_in_a_row_are_the_same_as_one_by_one_and_fresh_robots_forget() -> 
 def test_the_map_does_not_depend_on_which_feet_stand_by_the_clock() -> None:
     network = SteppingActor(**SMALL, camera=CAMERA.describe()).eval()  # type: ignore[arg-type]
     vector = sensed(poses(np.random.default_rng(3), 0.0), np.zeros((N, 3)), np.zeros((N, 3)))
-    memory = network.begin(vector, network.unpack(network.initial_state(N)), torch.ones(N, dtype=torch.bool))
+    stance = network.stance(vector)
+    memory = network.begin(stance, network.unpack(network.initial_state(N)), torch.ones(N, dtype=torch.bool))
     image, still = torch.full((N, CAMERA.height, CAMERA.width), 0.3), torch.zeros(N, 3)
     swinging = memory._replace(gait=memory.gait._replace(phases=torch.full((N, 4), 0.1)))
-    seen = [network.survey(image, vector, still, then)[0] for then in (memory, swinging)]
+    seen = [network.survey(image, stance, still, then)[0] for then in (memory, swinging)]
     assert seen[0].abs().max() > 0.05  # there is something on it
     torch.testing.assert_close(seen[0], seen[1])
 

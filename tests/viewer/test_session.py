@@ -125,13 +125,9 @@ def test_failure_of_the_source_ends_the_session_and_is_kept():
 
 @pytest.mark.slow
 def test_chain_with_both_policies_and_images_is_faster_than_real_time():
-    """Processor time: less than the 20 ms that a control step lasts. In a process of its own, for the types that tests
-    check at run time double it; the best of three, for what runs beside it on the same core slows it by a fifth."""
-    costs = []
-    while len(costs) < 3 and min(costs, default=np.inf) >= 20:
-        done = subprocess.run([sys.executable, str(MEASURE), "--seconds", "2"], capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        (cost,), (metres,) = (re.findall(rf"([\d.]+) {unit}", done.stdout) for unit in ("ms;", "m walked"))
-        costs.append(float(cost))
-        assert float(metres) > 0.2
-    assert min(costs) < 20, costs
+    """Processor time, so that what runs beside it does not count: less than the 20 ms that a control step lasts. In a
+    process of its own, for the types that tests check at run time double it."""
+    done = subprocess.run([sys.executable, str(MEASURE), "--seconds", "2"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (cost,), (metres,) = (re.findall(rf"([\d.]+) {unit}", done.stdout) for unit in ("ms;", "m walked"))
+    assert float(cost) < 20 and float(metres) > 0.2

@@ -83,11 +83,12 @@ class LocomotionController:
         Raises:
             InputError: the policy's answer is none.
         """
+        gait_rows = None
         if self._gait is not None:
-            command = self._gait.adapt(qpos, command)
+            command, gait_rows = self._gait.read(qpos, qvel, command)
         observation = observe(np, qpos, qvel, command, self.actions)[:, self._first :]
-        if self._gait is not None:
-            observation = insert_gait(np, observation, self._gait.read(qpos, qvel, command))
+        if gait_rows is not None:
+            observation = insert_gait(np, observation, gait_rows)
         if self._cameras is None:
             answer = self.policy.act(observation)
         else:

@@ -133,16 +133,13 @@ class GaitReader:
         """Go on with the gaits of the same robots on another map."""
         self.gait, self._last, self._fresh = before.gait, before._last, before._fresh
 
-    def adapt(self, qpos: Float[np.ndarray, "n 19"], command: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-        """The command that robots walk by, see ``adapt_command``."""
-        view, feet = self._maps.view(qpos), feet_in_heading_frame(np, qpos)
-        return adapt_command(np, self.config, view, command, feet)
-
     def read(
         self, qpos: Float[np.ndarray, "n 19"], qvel: Float[np.ndarray, "n 18"], command: Float[np.ndarray, "n 3"]
-    ) -> Float[np.ndarray, "n 63"]:
-        """One control step on: the rows of the gait, scaled, in the order of ``GAIT_ROWS``."""
-        feet = feet_in_heading_frame(np, qpos)
+    ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 63"]]:
+        """One control step on: the command that robots walk by, see ``adapt_command``, and the rows of the gait,
+        scaled, in the order of ``GAIT_ROWS``."""
+        view, feet = self._maps.view(qpos), feet_in_heading_frame(np, qpos)
+        command = adapt_command(np, self.config, view, command, feet)
         start = start_gait(np, self.config, feet)
         if self.gait is None or len(self._last) != len(qpos):
             gait, motion = start, np.zeros((len(qpos), 4))
@@ -157,6 +154,6 @@ class GaitReader:
         self._last, self._fresh = qpos.copy(), np.zeros(len(qpos), bool)
         gait = tick(np, self.config, gait, motion, command, feet)
         velocity = velocity_in_heading_frame(np, qpos, qvel)
-        plan = plan_footholds(np, self.config, self._maps.view(qpos), gait, velocity, command, feet)
+        plan = plan_footholds(np, self.config, view, gait, velocity, command, feet)
         self.gait = aim(np, self.config, gait, plan, velocity, command, feet)
-        return gait_rows(np, self.config, self.gait, feet) * _SCALE
+        return command, gait_rows(np, self.config, self.gait, feet) * _SCALE

@@ -143,7 +143,7 @@ class LocalMapView:
             square = best
         outside, inside = xp.sqrt(square[: len(grid)]), xp.sqrt(square[len(grid) :])
         distance = xp.clip(outside - inside - xp.where(solid, nothing - CELL / 2, nothing + CELL / 2), -_FAR, _FAR)
-        top = xp.where(solid, grid, 0 * grid)
+        top = xp.where(solid, grid, nothing)
         for axis in (0, 1):
             spread = [(k, 0) if axis == 0 else (0, k) for k in range(-_TOP_CELLS, _TOP_CELLS + 1) if k]
             top = self._highest(top, spread)

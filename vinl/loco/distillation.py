@@ -117,16 +117,17 @@ class Distillation:
     def _walk(self, step: Tensor) -> None:
         """One step of the roll-out; ``step`` (1,) is its number."""
         student, vector, truth, told = self.student, self._vector, self._truth, self._told
-        memory = student.begin(vector, student.unpack(self._state), self._begun)
-        inputs = student.network_input(vector, memory)
+        stance = student.stance(vector)
+        memory = student.begin(stance, student.unpack(self._state), self._begun)
+        inputs = student.network_input(vector, stance, memory)
         for kept, now in ((self._inputs, inputs), (self._velocity, truth.velocity), (self._fresh, self._begun)):
             kept.index_copy_(0, step, now[None])
         said, network = student.estimate(inputs[None], memory.network, self._begun[None])
         velocity = torch.where(told, truth.velocity, said[0])
-        heights, map_ = student.survey(self._depth, vector, velocity, memory)
+        heights, map_ = student.survey(self._depth, stance, velocity, memory)
         self._mapping += torch.stack([((heights - truth.heights) ** 2).sum(), (truth.heights**2).sum()])
         believed = Prediction(velocity, torch.where(told, truth.heights, heights))
-        action, gait = student.walk(vector, believed, memory)
+        action, gait = student.walk(vector, stance, believed, memory)
         self._action.copy_(action)
         for kept, now in zip(self._state, student.pack(Memory(network, gait, velocity, map_)), strict=True):
             kept.copy_(now)

@@ -36,6 +36,22 @@ _GAIT_NUMBERS = (4, 1, 4, 12, 12, 4, 1, 2)
 _COMMAND = SENSED_TABLE.place("command")
 
 
+class Stance(NamedTuple):
+    """What a robot measures of itself in one step, and what follows from it.
+
+    Attributes:
+        felt: the numbers of ``SENSED_TABLE`` in SI units, by its names; joint positions as angles.
+        axes: (n, 3, 3) of the heading frame in the trunk's.
+        in_trunk: (n, 4, 3) the feet in the frame of the trunk [m].
+        feet: (n, 4, 3) the feet in the heading frame [m].
+    """
+
+    felt: dict[str, Tensor]
+    axes: Tensor
+    in_trunk: Tensor
+    feet: Tensor
+
+
 class Prediction(NamedTuple):
     """What a robot believes in one step.
 
@@ -144,26 +160,20 @@ class SteppingActor(PolicyNetwork):
 
     # ---- parts of a step --------------------------------------------------------------------------------------------
 
-    def feel(self, vector: Float[Tensor, "n 45"]) -> dict[str, Tensor]:
-        """The scaled numbers in SI units, by the names of the table; joint positions as angles."""
+    def stance(self, vector: Float[Tensor, "n 45"]) -> Stance:
+        """What the scaled numbers say."""
         plain, felt, first = vector / self.sensed_scale, {}, 0
         for term in SENSED_TABLE:
             felt[term.name] = plain[:, first : first + term.size]
             first += term.size
         felt["joint_position"] = felt["joint_position"] + self.default_pose
-        return felt
+        axes, feet = heading_axes(torch, felt["projected_gravity"]), feet_in_trunk(torch, felt["joint_position"])
+        return Stance(felt, axes, feet, into_heading_frame(axes, feet))
 
-    def stance(self, vector: Float[Tensor, "n 45"]) -> tuple[dict[str, Tensor], Tensor, Tensor]:
-        """What ``feel`` gives, the axes of the heading frame and the feet in it [m]."""
-        felt = self.feel(vector)
-        axes = heading_axes(torch, felt["projected_gravity"])
-        return felt, axes, into_heading_frame(axes, feet_in_trunk(torch, felt["joint_position"]))
-
-    def network_input(self, vector: Float[Tensor, "n 45"], memory: Memory) -> Float[Tensor, "n 68"]:
+    def network_input(self, vector: Float[Tensor, "n 45"], stance: Stance, memory: Memory) -> Float[Tensor, "n 68"]:
         """What the estimator of the velocity is given: the robot's senses, the legs' phases, the velocity that it last
         said, and how fast the trunk would move if each foot stood still [m/s]."""
-        angle, felt = 2 * torch.pi * memory.gait.phases, self.feel(vector)
-        feet = feet_in_trunk(torch, felt["joint_position"])
+        angle, felt, feet = 2 * torch.pi * memory.gait.phases, stance.felt, stance.in_trunk
         before = feet_in_trunk(torch, felt["joint_position"] - CONTROL_DT * felt["joint_velocity"])
         turning = felt["base_angular_velocity"][:, None].expand_as(feet)
         odometry = (before - feet) / CONTROL_DT - torch.linalg.cross(turning, feet)
@@ -179,21 +189,21 @@ class SteppingActor(PolicyNetwork):
     def survey(
         self,
         image: Float[Tensor, "n height width"] | None,
-        vector: Float[Tensor, "n 45"],
+        stance: Stance,
         velocity: Tensor,
         then: Memory,
     ) -> tuple[Float[Tensor, "n 741"], MapState | None]:
         """Heights about the robot, and the map after this step's image."""
         if self.elevation is None or then.map is None or image is None:
-            return torch.zeros(len(vector), len(POINTS), device=vector.device), None
-        felt, axes, feet = self.stance(vector)
+            return torch.zeros(len(velocity), len(POINTS), device=velocity.device), None
+        felt, axes, _, feet = stance
         now = self.elevation.move(then.map, motion_of(torch, axes, velocity, felt["base_angular_velocity"]))
         now = self.elevation.see(now, image, axes, floor_under(torch, feet))
         return self.elevation.read(now), now
 
-    def begin(self, vector: Float[Tensor, "n 45"], memory: Memory, fresh: Bool[Tensor, " n"]) -> Memory:
+    def begin(self, stance: Stance, memory: Memory, fresh: Bool[Tensor, " n"]) -> Memory:
         """The memory before a step: robots that are fresh stand with their feet where they are."""
-        start = start_gait(torch, self.gait, self.stance(vector)[2])
+        start = start_gait(torch, self.gait, stance.feet)
         gait = GaitState(
             *(
                 torch.where(fresh.reshape(-1, *(1,) * (a.ndim - 1)), a, b)
@@ -206,11 +216,11 @@ class SteppingActor(PolicyNetwork):
         return Memory(memory.network, gait, torch.where(fresh[:, None], 0.0, memory.velocity), map_)
 
     def walk(
-        self, vector: Float[Tensor, "n 45"], said: Prediction, memory: Memory, adapt: bool = False
+        self, vector: Float[Tensor, "n 45"], stance: Stance, said: Prediction, memory: Memory, adapt: bool = False
     ) -> tuple[Float[Tensor, "n 12"], GaitState]:
         """Actions of what is believed, or known to be right, and the gait after them; ``adapt``: by the command of
         ``adapt_command``. Trainings walk as they are told."""
-        felt, axes, feet = self.stance(vector)
+        felt, axes, _, feet = stance
         view, command = LocalMapView(torch, said.heights, floor_under(torch, feet)), felt["command"]
         if adapt:
             command = adapt_command(torch, self.gait, view, command, feet)
@@ -245,11 +255,12 @@ class SteppingActor(PolicyNetwork):
         """
         actions = []
         for k in range(len(fresh)):
-            memory = self.begin(vector[k], self.unpack(state), fresh[k])
-            inputs = self.network_input(vector[k], memory)[None]
+            stance = self.stance(vector[k])
+            memory = self.begin(stance, self.unpack(state), fresh[k])
+            inputs = self.network_input(vector[k], stance, memory)[None]
             velocity, network = self.estimate(inputs, memory.network, fresh[k : k + 1])
-            heights, map_ = self.survey(None if depth is None else depth[k], vector[k], velocity[0], memory)
-            action, gait = self.walk(vector[k], Prediction(velocity[0], heights), memory, adapt=True)
+            heights, map_ = self.survey(None if depth is None else depth[k], stance, velocity[0], memory)
+            action, gait = self.walk(vector[k], stance, Prediction(velocity[0], heights), memory, adapt=True)
             actions.append(action)
             state = self.pack(Memory(network, gait, velocity[0], map_))
         return torch.stack(actions), state
