@@ -1,7 +1,9 @@
-"""The command that a robot walks by: blocks are crossed quickly. For numpy, jax.numpy and torch alike (``xp``)."""
+"""The command that a robot walks by: blocks are crossed quickly, walls are not run into. For numpy, jax.numpy and torch
+alike (``xp``)."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,29 +20,37 @@ of 0.3 m/s, has no room for a bar 0.2 m deep."""
 LEAST = 0.1
 """Commands below this are not raised [m/s]: the robot is to stand, or to turn on the spot."""
 
+GRAZING_SPEED = 0.2
+"""Largest forward speed where a wall is right before the trunk [m/s]: at 0.8 m/s it is pushed and feet run up it. A
+robot that stood still would never slide past what it only grazes."""
 
-def _grid(first: float, last: float) -> np.ndarray:
-    """Places 0.1 m apart, from behind to ahead and 0.2 m to both sides [m]."""
-    x, y = np.arange(first, last + 0.01, 0.1), np.arange(-0.2, 0.21, 0.1)
+
+def _grid(ahead: tuple[float, float, float], aside: tuple[float, float]) -> np.ndarray:
+    """Places from the hindmost to the foremost and to both sides, so far apart [m]."""
+    x, y = np.arange(ahead[0], ahead[1] + 0.01, ahead[2]), np.arange(-aside[0], aside[0] + 0.01, aside[1])
     return np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2).astype(np.float32)
 
 
-UNDER = _grid(-0.45, 0.75)
+UNDER = _grid((-0.45, 0.75, 0.1), (0.2, 0.1))
 """(65, 2) where a block counts [m]: from the rear feet to the front feet's next footholds."""
 
-AHEAD = _grid(0.35, 0.95)
+AHEAD = _grid((0.35, 0.95, 0.1), (0.2, 0.1))
 """(35, 2) where a wall forbids to go faster [m]."""
 
-_POINTS = np.concatenate([np.insert(xy, 2, z, 1) for xy, z in ((UNDER, SOLID), (UNDER, WALL), (AHEAD, WALL))]).astype(
-    np.float32
-)
-"""(165, 3) all that is asked of the map, above the floor: in one go, for a robot's computer is slow to begin each."""
+NOSE = _grid((0.36, 0.41, 0.05), (0.14, 0.07))
+"""(10, 2) where a wall slows a robot down [m]: 3 to 9 cm before the trunk, which ends 0.325 m ahead of its middle, and
+nearly as wide."""
 
-_PARTS = slice(0, len(UNDER)), slice(len(UNDER), 2 * len(UNDER)), slice(2 * len(UNDER), None)
+_ASKED = (UNDER, SOLID), (UNDER, WALL), (AHEAD, WALL), (NOSE, WALL)
+_POINTS = np.concatenate([np.insert(xy, 2, z, 1) for xy, z in _ASKED]).astype(np.float32)
+"""(175, 3) all that is asked of the map, above the floor: in one go, for a robot's computer is slow to begin each."""
+
+_ENDS = np.cumsum([0, *(len(xy) for xy, _ in _ASKED)]).tolist()
 
 
 def adapt_command(xp: Any, config: GaitConfig, view: GroundView | None, command: Any, feet: Any) -> Any:
-    """(n, 3) the command that robots walk by: over blocks at ``CROSSING_SPEED`` at least, unless a wall is ahead.
+    """(n, 3) the command that robots walk by: over blocks at ``CROSSING_SPEED`` at least, unless a wall is ahead, and
+    before a wall at ``GRAZING_SPEED`` at most.
 
     A wall is what stands higher than ``WALL`` over the floor, furniture too.
 
@@ -56,8 +66,9 @@ def adapt_command(xp: Any, config: GaitConfig, view: GroundView | None, command:
     floor, forward = floor_under(xp, feet), command[:, 0]
     points = constant(xp, _POINTS, command) + 0 * command[:, None, :1]
     inside = view.clearance(xp.concatenate([points[..., :2], points[..., 2:] + floor[:, None, None]], -1)) < 0
-    low, high, ahead = (inside[:, part] for part in _PARTS)
+    low, high, ahead, nose = (inside[:, first:end] for first, end in pairwise(_ENDS))
     over, wall = (low & ~high).any(-1), ahead.any(-1)
     hurries = over & ~wall & (forward > LEAST) & (forward < CROSSING_SPEED)
     forward = xp.where(hurries, 0 * forward + CROSSING_SPEED, forward)
+    forward = xp.where(nose.any(-1), xp.clip(forward, None, GRAZING_SPEED), forward)
     return xp.concatenate([forward[:, None], command[:, 1:]], -1)
