@@ -18,6 +18,7 @@ from vinl.world.grid import BLOCK, GridFrame, flat_field, raise_boxes
 
 CONFIG = GaitConfig()
 FRAME = GridFrame(-4.0, -4.0, 0.05, (161, 161))
+SHOE = ([0.5, 0.0, 0.4, 0.15, 0.15, 0.0, 0.1],)
 BAR, LATER, PASSED = (([x, 0.0, 0.0, 0.2, 1.0, 0.0, 0.1],) for x in (0.5, 1.2, -0.8))
 BESIDE = ([0.5, 0.5, 0.0, 0.2, 0.2, 0.0, 0.1],)
 WALL, WALLS_BESIDE = ([0.9, 0.0, 0.0, 0.1, 2.0, 0.0, 2.5],), ([0.5, 0.35, 0.0, 2.0, 0.1, 0.0, 2.5],)
@@ -49,6 +50,7 @@ def walked_by(boxes, command, xp=np, convert=np.asarray, config=CONFIG) -> np.nd
         (LATER, 0.3, 0.3),
         (PASSED, 0.3, 0.3),
         (BESIDE, 0.3, 0.3),
+        (SHOE, 0.3, 0.3),
         (WALLS_BESIDE, 0.3, 0.3),
     ],
 )
@@ -84,7 +86,9 @@ def test_without_a_map_commands_stay():
     np.testing.assert_allclose(adapt_command(np, GaitConfig(), None, np.array([command]), feet), [command])
 
 
-@pytest.mark.parametrize(("height", "walked"), [(0.03, CROSSING_SPEED), (0.2, CROSSING_SPEED), (0.02, 0.3), (0.5, GRAZING_SPEED)])
+@pytest.mark.parametrize(
+    ("height", "walked"), [(0.03, CROSSING_SPEED), (0.2, CROSSING_SPEED), (0.02, 0.3), (0.5, GRAZING_SPEED)]
+)
 def test_a_map_from_images_tells_blocks_from_floor_and_walls(height, walked):
     feet = feet_in_heading_frame(np, home_qpos(0.0, 0.0, 0.38, 0.0)[None])
     heights = np.where((POINTS[:, 0] > 0.36) & (POINTS[:, 0] < 0.62), height, 0.0)[None]
