@@ -26,30 +26,28 @@ robot that stood still would never slide past what it only grazes."""
 
 
 def _grid(ahead: tuple[float, float, float], aside: tuple[float, float]) -> np.ndarray:
-    """Places from the hindmost to the foremost and to both sides, so far apart [m]."""
+    """(rows, places, 2): rows across the way from the hindmost to the foremost, places to both sides; pitches [m]."""
     x, y = np.arange(ahead[0], ahead[1] + 0.01, ahead[2]), np.arange(-aside[0], aside[0] + 0.01, aside[1])
-    return np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2).astype(np.float32)
+    return np.stack(np.meshgrid(x, y, indexing="ij"), -1).astype(np.float32)
 
 
 UNDER = _grid((-0.45, 0.75, 0.1), (0.2, 0.1))
-"""(65, 2) where a block counts [m]: from the rear feet to the front feet's next footholds."""
-
-_ROWS = 13, 5
-"""A block counts that lies all across one of these rows, 0.4 m: smaller ones, as toys and shoes are, lie between the
-feet or beside them, and are touched more often in a hurry."""
+"""(13, 5, 2) where a block counts [m], from the rear feet to the front feet's next footholds: one that lies all across
+a row, 0.4 m. Smaller ones, as toys and shoes are, lie between the feet or beside them, and are touched more often in a
+hurry."""
 
 AHEAD = _grid((0.35, 0.95, 0.1), (0.2, 0.1))
-"""(35, 2) where a wall forbids to go faster [m]."""
+"""(7, 5, 2) where a wall forbids to go faster [m]."""
 
 NOSE = _grid((0.36, 0.41, 0.05), (0.14, 0.07))
-"""(10, 2) where a wall slows a robot down [m]: 3 to 9 cm before the trunk, which ends 0.325 m ahead of its middle, and
-nearly as wide."""
+"""(2, 5, 2) where a wall slows a robot down [m]: 3 to 9 cm before the trunk, which ends 0.325 m ahead of its middle,
+and nearly as wide."""
 
 _ASKED = (UNDER, SOLID), (UNDER, WALL), (AHEAD, WALL), (NOSE, WALL)
-_POINTS = np.concatenate([np.insert(xy, 2, z, 1) for xy, z in _ASKED]).astype(np.float32)
+_POINTS = np.concatenate([np.insert(xy.reshape(-1, 2), 2, z, 1) for xy, z in _ASKED]).astype(np.float32)
 """(175, 3) all that is asked of the map, above the floor: in one go, for a robot's computer is slow to begin each."""
 
-_ENDS = np.cumsum([0, *(len(xy) for xy, _ in _ASKED)]).tolist()
+_ENDS = np.cumsum([0, *(xy[..., 0].size for xy, _ in _ASKED)]).tolist()
 
 
 def adapt_command(xp: Any, config: GaitConfig, view: GroundView | None, command: Any, feet: Any) -> Any:
@@ -71,7 +69,7 @@ def adapt_command(xp: Any, config: GaitConfig, view: GroundView | None, command:
     points = constant(xp, _POINTS, command) + 0 * command[:, None, :1]
     inside = view.clearance(xp.concatenate([points[..., :2], points[..., 2:] + floor[:, None, None]], -1)) < 0
     low, high, ahead, nose = (inside[:, first:end] for first, end in pairwise(_ENDS))
-    over = (low & ~high).reshape(-1, *_ROWS).all(-1).any(-1)
+    over = (low & ~high).reshape(-1, *UNDER.shape[:2]).all(-1).any(-1)
     wall = ahead.any(-1)
     hurries = over & ~wall & (forward > LEAST) & (forward < CROSSING_SPEED)
     forward = xp.where(hurries, 0 * forward + CROSSING_SPEED, forward)
