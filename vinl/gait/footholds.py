@@ -40,7 +40,7 @@ _WIDTH = (0.15, 0.10)
 _INWARD = 0.05, 0.03
 """A foothold this much nearer to the other side's feet is free; farther in, so much more costs 1 [m]."""
 
-EDGE, _SHANK = 0.035, 0.04
+EDGE, _SHANK = 0.03, 0.04
 """Footholds cost whose foot is with its surface, whose shank with its axis nearer to a block than this [m]."""
 
 _NEAR, _ROOM = 200.0, 0.005

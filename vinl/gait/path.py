@@ -10,9 +10,8 @@ from vinl.gait.config import GaitConfig
 from vinl.gait.state import GaitState
 from vinl.robot.aliengo import CONTROL_DT
 
-_WAIT = 0.12
-"""At both ends of a swing the foot moves up or down alone, for this fraction of it: the shank follows the foot, and feet
-that touched a block of 15 cm did so while they rose in front of it."""
+_WAIT = 0.08
+"""At both ends of a swing the foot moves up or down alone, for this fraction of it: the shank follows the foot."""
 
 _STEEP = 0.6
 """The height of the path is sin(pi s) to this power: at a tenth of the swing it is at half of its apex."""
