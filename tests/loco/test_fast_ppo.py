@@ -111,6 +111,14 @@ def test_a_schedule_may_move_rate_divergence_and_entropy():
     assert_same_weights(a, b)
 
 
+def test_a_limit_holds_a_rate_that_follows_the_divergence():
+    env = NoiseEnv()
+    algorithm = build("vinl.loco.fast_ppo:FastPPO", env, desired_kl=1.0)  # never reached: the rate rises
+    assert learn(algorithm, env, 1)[0]["rate"] > 2e-3
+    algorithm.limit_rate(5e-4)
+    assert [row["rate"] for row in learn(algorithm, env, 2)] == pytest.approx([5e-4, 5e-4])
+
+
 def test_either_goes_on_from_the_others_state():
     env_a, env_b = NoiseEnv(), NoiseEnv()
     slow, fast = build("PPO", env_a), build("vinl.loco.fast_ppo:FastPPO", env_b)

@@ -181,6 +181,10 @@ class LocoPpoConfig:
         epochs, minibatches: passes over the roll-out and parts of each.
         learning_rate: at the start; adapts to the divergence.
         desired_kl: divergence that the learning rate is steered to.
+        cool_from: from this fraction of the iterations on the learning rate is limited; 1: never. What ships acts
+            without chance, as its last update left it: one that still takes long steps leaves it anywhere about its
+            optimum.
+        cool_rates: the limit at ``cool_from`` and at the end; it falls linearly.
         gamma, lam: discount and GAE factor.
         clip: of the probability ratio and of the value.
         entropy: weight of the entropy bonus.
@@ -199,6 +203,8 @@ class LocoPpoConfig:
     minibatches: int = 4
     learning_rate: float = 1e-3
     desired_kl: float = 0.01
+    cool_from: float = 1.0
+    cool_rates: tuple[float, float] = (3e-4, 1e-5)
     gamma: float = 0.99
     lam: float = 0.95
     clip: float = 0.2
@@ -212,9 +218,18 @@ class LocoPpoConfig:
     update: Literal["rsl_rl", "fast", "graphs"] = "graphs"
 
     def __post_init__(self) -> None:
-        rates = ("learning_rate", "desired_kl", "init_std", "gamma")
-        counts, fractions = ("steps", "epochs", "minibatches"), ("gamma", "lam")
+        rates = ("learning_rate", "desired_kl", "cool_rates", "init_std", "gamma")
+        counts, fractions = ("steps", "epochs", "minibatches"), ("cool_from", "gamma", "lam")
         check_fields(self, "ppo.", counts=counts, unsigned=("critic_warmup",), positive=rates, fractions=fractions)
+        if self.cool_from < 1 and self.update == "rsl_rl":
+            raise InputError("ppo.cool_from: rsl-rl's own update knows no limit; choose update fast or graphs")
+
+    def highest_rate(self, fraction: float) -> float | None:
+        """The limit of the learning rate after a fraction of the iterations; None: there is none."""
+        if fraction < self.cool_from or self.cool_from >= 1:
+            return None
+        first, last = self.cool_rates
+        return first + (fraction - self.cool_from) / (1.0 - self.cool_from) * (last - first)
 
 
 @dataclass(frozen=True)

@@ -77,6 +77,10 @@ class FastPPO(PPO):
         else:  # rsl-rl's own initialisation
             self._first_rate = float(rate)
 
+    def limit_rate(self, highest: float) -> None:
+        """Hold the learning rate, which follows the divergence, to a limit."""
+        self.rate.limit(min(_LOWEST, highest), highest)
+
     def compute_returns(self, obs: TensorDict) -> None:
         """See rsl-rl; the advantages are kept in a place of their own."""
         super().compute_returns(obs)

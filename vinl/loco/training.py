@@ -144,6 +144,9 @@ def train_locomotor(
         environment.simulation.set_solid(fraction >= config.terrain.ghost)
         if config.anneal.entropy is not None:
             algorithm.entropy_coef = config.anneal.blend(fraction, config.ppo.entropy, config.anneal.entropy)
+        highest = config.ppo.highest_rate(fraction)
+        if highest is not None:
+            algorithm.limit_rate(highest)
 
     settings, place = rsl_rl_settings(config, peers), peer_folder(run, peers)
     runner = TrainingRunner(peers, env, settings, place, device, export, describe_figures, schedule, save_every)
