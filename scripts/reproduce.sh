@@ -20,10 +20,10 @@ train() {  # name, then what a new run is started with
 }
 
 train rough --stage 1                                                          #  39 M   2.5 min
-train teacher --stage 2 --from "$runs/rough"                                   # 393 M  25.2 min
+train teacher --stage 2 --from "$runs/rough"                                   # 295 M  18.9 min
 train student --stage 3 --from "$runs/teacher"                                 #  15 M   3.5 min
 
 # baselines [paper IV-B]: the same samples in each stage
-train blind --config loco/blind --from "$runs/rough"                           # 393 M  25.2 min
-train no_pretraining --config loco/no_pretraining                              # 393 M  25.2 min
+train blind --config loco/blind --from "$runs/rough"                           # 295 M  18.9 min
+train no_pretraining --config loco/no_pretraining                              # 295 M  18.9 min
 train mlp --config loco/mlp --from "$runs/teacher"                             #  15 M   3.5 min
