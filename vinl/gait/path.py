@@ -10,7 +10,7 @@ from vinl.gait.config import GaitConfig
 from vinl.gait.state import GaitState
 from vinl.robot.aliengo import CONTROL_DT
 
-_WAIT = 0.08
+_WAIT = 0.12
 """At both ends of a swing the foot moves up or down alone, for this fraction of it: the shank follows the foot."""
 
 _STEEP = 0.6
