@@ -32,9 +32,9 @@ def _grid(ahead: tuple[float, float, float], aside: tuple[float, float]) -> np.n
 
 
 UNDER = _grid((-0.45, 0.95, 0.1), (0.2, 0.1))
-"""(15, 5, 2) where a block counts [m], from the rear feet to the front feet's next footholds and 0.2 m farther, in which
-a robot gains speed: one that lies all across a row, 0.4 m. Smaller ones, as toys and shoes are, lie between the feet or beside them, and are touched more often in a
-hurry."""
+"""(15, 5, 2) where a block counts [m], from the rear feet to the front feet's next footholds and 0.2 m farther, in
+which a robot gains speed: one that lies all across a row, 0.4 m. Smaller ones, as toys and shoes are, lie between the
+feet or beside them, and are touched more often in a hurry."""
 
 AHEAD = _grid((0.35, 0.95, 0.1), (0.2, 0.1))
 """(7, 5, 2) where a wall forbids to go faster [m]."""

@@ -48,16 +48,20 @@ class LocoVecEnv(VecEnv):
         self._lent: deque[torch.Tensor] = deque(maxlen=_LENT * len(GaitState._fields))
         self._count = 0
         self.followed: Callable[[], GaitState] | None = None
+        self._seen: dict[str, torch.Tensor] | None = None
+        self._resumed: dict[str, torch.Tensor] | None = None
 
     def get_observations(self) -> TensorDict:
         """Of the present state."""
-        return self._pack({name: x.clone() for name, x in self._in_torch(self.environment.observe()).items()}, None)
+        seen, self._resumed = self._resumed or self._in_torch(self.environment.observe()), None
+        return self._pack({name: x.clone() for name, x in seen.items()}, None)
 
     def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
         """Actions (n, 12) to observations, rewards (n,), dones (n,) and ``time_outs`` (n,)."""
         seen, *ends = self._simulate(actions)
         reward, done, timeout = (self._to_torch(x) for x in ends)
-        return self._pack(self._in_torch(seen), done), reward, done, {"time_outs": timeout.float()}
+        self._seen = self._in_torch(seen)
+        return self._pack(self._seen, done), reward, done, {"time_outs": timeout.float()}
 
     def _simulate(self, actions: torch.Tensor) -> StepResult:
         gait = None if self.followed is None else GaitState(*(self._to_jax(x) for x in self.followed()))
@@ -79,9 +83,11 @@ class LocoVecEnv(VecEnv):
         return self.environment.take_lost()
 
     def save_state(self) -> dict[str, Any]:
-        """The whole state of all robots, levels and random numbers included: arrays by the names of their fields."""
-        noise = torch.tensor(float(self.environment.noise))  # the first observation after a resumption has it too
-        return {name: _saved(np.asarray(x)) for name, x in _by_name(self.environment.state).items()} | {"noise": noise}
+        """The whole state of all robots, levels and random numbers included: arrays by the names of their fields. And
+        what was seen of it: looked at anew, outside the compiled step, it may differ in the last bits."""
+        state = {name: _saved(np.asarray(x)) for name, x in _by_name(self.environment.state).items()}
+        seen = {} if self._seen is None else {"seen": {name: x.cpu().clone() for name, x in self._seen.items()}}
+        return {**state, "noise": torch.tensor(float(self.environment.noise)), **seen}
 
     def load_state(self, state: dict[str, Any]) -> None:
         """Go on from a saved state.
@@ -100,6 +106,7 @@ class LocoVecEnv(VecEnv):
             raise ValueError(f"it holds {len(saved['step'])} robots, this run has {self.num_envs}")
         if "noise" in state:
             self.environment.set_noise(float(state["noise"]))
+        self._resumed = {name: x.to(self.device) for name, x in state["seen"].items()} if "seen" in state else None
         leaves = [saved[name] for name in present]
         shape = jax.tree.structure(self.environment.state)
         self.environment.state = jax.device_put(jax.tree.unflatten(shape, leaves), jax.devices()[0])
