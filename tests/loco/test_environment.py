@@ -6,12 +6,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import torch
 
 from vinl.gait.observation import STEPPING_MAP_TABLE, insert_gait, observe_gait
 from vinl.gait.state import GaitState, feet_in_heading_frame, swings
 from vinl.loco.environment import LocoEnvironment
 from vinl.loco.randomisation import plain_traits
 from vinl.loco.simulation import PAST, Body, Simulation
+from vinl.loco.vec_env import LocoVecEnv
 from vinl.robot.aliengo import DEFAULT_POSE, home_qpos
 from vinl.robot.observation import observe
 from vinl.sensing.height_scan import scan_ground
@@ -31,6 +33,17 @@ def fresh(env, small_config):
     """The environment in its first state."""
     env.state = jax.device_put(jax.jit(env._first_state)(jax.random.PRNGKey(0)), jax.devices()[0])
     return env
+
+
+def test_a_run_goes_on_from_what_was_seen_though_saved_again_before_a_step(fresh):
+    first, second, third = (LocoVecEnv(fresh, "cpu") for _ in range(3))
+    seen = first.step(torch.zeros(8, 12))[0]["policy"].clone()
+    saved = first.save_state()
+    saved["seen"]["noisy"] += 1.0  # told apart from what is looked at anew
+    second.load_state(saved)
+    third.load_state(second.save_state())
+    torch.testing.assert_close(third.get_observations()["policy"], seen + 1.0, rtol=0, atol=0)
+    torch.testing.assert_close(third.get_observations()["policy"], seen)
 
 
 def test_observation_is_that_of_the_evaluation(fresh):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
+import numpy as np
+
 from vinl.config.errors import InputError
 from vinl.config.limits import Range, check_fields, check_limits
 from vinl.gait.config import GaitConfig
@@ -228,8 +230,7 @@ class LocoPpoConfig:
         """The limit of the learning rate after a fraction of the iterations; None: there is none."""
         if fraction < self.cool_from or self.cool_from >= 1:
             return None
-        first, last = self.cool_rates
-        return first + (fraction - self.cool_from) / (1.0 - self.cool_from) * (last - first)
+        return float(np.interp(fraction, (self.cool_from, 1.0), self.cool_rates))
 
 
 @dataclass(frozen=True)

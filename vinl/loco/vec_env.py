@@ -106,7 +106,8 @@ class LocoVecEnv(VecEnv):
             raise ValueError(f"it holds {len(saved['step'])} robots, this run has {self.num_envs}")
         if "noise" in state:
             self.environment.set_noise(float(state["noise"]))
-        self._resumed = {name: x.to(self.device) for name, x in state["seen"].items()} if "seen" in state else None
+        seen = state.get("seen")  # None: an older version wrote it
+        self._seen = self._resumed = None if seen is None else {name: x.to(self.device) for name, x in seen.items()}
         leaves = [saved[name] for name in present]
         shape = jax.tree.structure(self.environment.state)
         self.environment.state = jax.device_put(jax.tree.unflatten(shape, leaves), jax.devices()[0])
