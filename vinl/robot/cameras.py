@@ -70,11 +70,11 @@ class Camera:
         return asdict(self)
 
 
-LOCOMOTION_CAMERA = Camera("locomotion", (0.32, 0.0, 0.0), 0.524, 1.518, 64, 36, 2.0)
-"""Looks 30 deg down at the ground in front of the feet, 87 deg wide like the Intel D435; what all shipped locomotion
-policies with a camera see through. ViNL has it at 0.35 m, where it looks through a wall that the nose (0.339 m)
+LOCOMOTION_CAMERA = Camera("locomotion", (0.32, 0.0, 0.0), 0.524, 1.92, 96, 56, 2.0)
+"""Looks 30 deg down at the ground in front of the feet, 110 x 80 deg wide like the Stereolabs ZED X Mini (2.2 mm lens,
+0.1 to 8 m); what all shipped locomotion policies with a camera see through. ViNL has it at 0.35 m, where it looks through a wall that the nose (0.339 m)
 touches."""
 
-NAVIGATION_CAMERA = Camera("navigation", (0.32, 0.0, 0.0), 0.0, 1.5708, 80, 60, 10.0, "fill")
-"""Looks ahead, level and 90 deg wide; what the shipped navigation policy sees through. ViNL's, at 0.35 m, 15 deg up,
+NAVIGATION_CAMERA = Camera("navigation", (0.32, 0.0, 0.0), 0.0, 1.92, 96, 56, 10.0, "fill")
+"""Looks ahead, level and as wide; what the shipped navigation policy sees through. ViNL's, at 0.35 m, 15 deg up,
 70 deg and 320 x 180 pixels, is in the config ``nav/paper``."""
