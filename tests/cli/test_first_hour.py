@@ -132,7 +132,7 @@ def test_policies_fit_a_screen(capsys: pytest.CaptureFixture[str], monkeypatch) 
     assert main(["policies"]) == 0
     said = capsys.readouterr().out
     assert len(said.splitlines()) <= 40 and max(map(len, said.splitlines())) <= 90
-    assert "depth 64 x 36" in said and "deg" in said and "success" in said
+    assert "depth 96 x 56" in said and "deg" in said and "success" in said
     for name in ("loco", "nav"):
         assert main(["policies", name]) == 0
         said = capsys.readouterr().out

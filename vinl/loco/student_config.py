@@ -79,8 +79,6 @@ class DistillationConfig:
         learning_rate, last_learning_rate: of Adam, at the start and at the end; a cosine between them.
         warmup: fraction of the iterations in which the rate rises from zero.
         max_grad_norm: gradients are clipped to this norm.
-        way: weight of the squared error of the distance [m^2] that velocities add up to within a window of ``bptt``
-            steps: the map is moved by it.
         teacher_share: fraction of the robots that walk by what is true at the start; 0 is the paper's.
         teacher_until: fraction of the iterations after which none does.
     """
@@ -93,7 +91,6 @@ class DistillationConfig:
     last_learning_rate: float = 3e-5
     warmup: float = 0.01
     max_grad_norm: float = 1.0
-    way: float = 0.0
     teacher_share: float = 1.0
     teacher_until: float = 0.04
 
