@@ -230,15 +230,6 @@ def test_the_memory_may_be_taught_places(tmp_path, small):
     assert (count_guesses(NavPpoConfig(places=0.3)), count_guesses(NavPpoConfig())) == (81, 0)
 
 
-def test_a_network_with_a_map_of_its_own_can_be_trained_and_judged(tmp_path, small):
-    assert train(small, tmp_path / "run", "--iterations", "2", "network.places=true") == 0
-    assert load_policy(tmp_path / "run").card.network["places"]["max_speed"] == 1.0
-    judged = ["--floorplans", "harbour_flat", "--episodes", "2", "--steps", "3", "--out", str(tmp_path / "out")]
-    assert main(["eval-nav", "--policy", str(tmp_path / "run"), *judged]) == 0
-    with pytest.raises(InputError, match="previous"):
-        build_config(NavConfig, {"previous": "action", "network": {"places": True}})
-
-
 def test_settings_reach_the_algorithm():
     config = build_config(NavConfig, {"num_envs": 4, "camera": None, "ppo": {"clip": 0.1, "steps": 3, "lam": 0.9}})
     algorithm = build_algorithm(config, "cpu")

@@ -337,5 +337,3 @@ class NavConfig:
             raise InputError(f"previous must be one of {', '.join(PREVIOUS)}, got {self.previous!r}")
         if self.camera is not None and self.camera.missing == "plane" and self.ppo.image_type == "uint8":
             raise InputError("camera.missing=plane needs ppo.image_type=float16: a byte has no room for the mark")
-        if self.network.places and self.previous == "action":
-            raise InputError("network.places needs previous=motion or both: the map follows the robot's own motion")

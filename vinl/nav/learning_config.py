@@ -24,8 +24,6 @@ class NavNetworkConfig:
         embedding: numbers that goal and previous action become, each.
         hidden, layers: width and layers of the memory.
         memory: ``lstm``, or ``mlp``, which remembers nothing.
-        places: the network keeps a map of its own of where it has been and what its camera saw to be solid, and sees
-            the 4 m around it (``vinl.policies.own_map``); needs ``previous`` motion or both.
     """
 
     vision: str = "resnet18"
@@ -35,7 +33,6 @@ class NavNetworkConfig:
     hidden: int = 512
     layers: int = 2
     memory: str = "lstm"
-    places: bool = False
 
     def __post_init__(self) -> None:
         if self.vision not in VISIONS:

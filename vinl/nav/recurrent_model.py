@@ -15,13 +15,12 @@ from torch import Tensor, nn
 
 from vinl.config.errors import InputError
 from vinl.config.output import write_whole
-from vinl.nav.config import NavCameraConfig, NavConfig
+from vinl.nav.config import NavConfig
 from vinl.policies.card import PolicyCard
 from vinl.policies.depth_memory import State
 from vinl.policies.io import load_policy
 from vinl.policies.nav_actor import PREVIOUS_SIZE, NavActor
 from vinl.policies.networks import PolicyNetwork
-from vinl.policies.own_map import MapGeometry
 
 
 class MemoryActor(Protocol):
@@ -212,17 +211,12 @@ CRITIC = "critic.safetensors"
 
 def build_actor(config: NavConfig) -> NavActor:
     """A navigator with fresh weights."""
-    camera, robot = config.camera, config.robot
+    camera = config.camera
     image: dict[str, Any] = {"vision": "none", "height": 1, "width": 1}
     if camera is not None:
         image = {"height": camera.height, "width": camera.width, "channels": 2 if camera.missing == "plane" else 1}
-    places = None
-    if config.network.places:
-        c, speeds = camera or NavCameraConfig(), (robot.min_speed, robot.max_speed, robot.max_yaw_rate)
-        view = c.hfov, c.pitch_down, c.far, c.forward, c.mount_height
-        places = MapGeometry(*speeds, robot.period, *view).describe()
     previous = PREVIOUS_SIZE * (2 if config.previous == "both" else 1)
-    return NavActor(**{**asdict(config.network), **image, "previous": previous, "places": places})
+    return NavActor(**{**asdict(config.network), **image, "previous": previous})
 
 
 def load_start(policy: str, config: NavConfig) -> tuple[dict[str, torch.Tensor], PolicyCard]:

@@ -8,7 +8,6 @@ from torch import Tensor, nn
 
 from vinl.policies.depth_memory import DepthMemory, State
 from vinl.policies.networks import PolicyNetwork
-from vinl.policies.own_map import MAP_SIZE, MapGeometry, blank_map, update_map
 
 GOAL_SIZE, PREVIOUS_SIZE = 3, 2
 """Numbers that say where the goal is (distance / 5 m, cosine and sine of the bearing), and of the last action."""
@@ -34,8 +33,6 @@ class NavActor(PolicyNetwork):
         planes: channels of the ResNet's first stage.
         previous: numbers on the last step: 2 of the action or the motion, 4 of both.
         channels: of the image: 1, or 2 with one for the pixels without a return.
-        places: ``MapGeometry`` as plain data: the network keeps a map of its own (``vinl.policies.own_map``) and sees
-            what is around it; its last step must end with the motion. None: it keeps none.
 
     Attributes:
         image: (height, width) [pixels], or None if blind.
@@ -58,26 +55,23 @@ class NavActor(PolicyNetwork):
         planes: int = 32,
         previous: int = PREVIOUS_SIZE,
         channels: int = 1,
-        places: dict[str, float] | None = None,
     ) -> None:
         super().__init__()
         self.observation_size = GOAL_SIZE + previous
         self.keep_arguments(locals())
         self.goal = nn.Linear(GOAL_SIZE, embedding)
         self.previous = nn.Linear(previous, embedding)
-        self.geometry = None if places is None else MapGeometry(**places)
-        self.places = None if places is None else nn.Sequential(nn.Linear(MAP_SIZE, 2 * embedding), nn.ReLU())
-        beside = 2 * embedding * (1 if places is None else 2)
-        self.memory = DepthMemory(vision, height, width, beside, visual, hidden, layers, memory, planes, channels)
+        self.memory = DepthMemory(
+            vision, height, width, 2 * embedding, visual, hidden, layers, memory, planes, channels
+        )
         self.image, self.feature_size = self.memory.image, hidden
         self.mean = nn.Linear(hidden, ACTION_SIZE)
         nn.init.orthogonal_(self.mean.weight, _MEAN_GAIN)
         nn.init.zeros_(self.mean.bias)
 
     def initial_state(self, n: int, device: torch.device | str | None = None) -> State:
-        """The memory of n robots that have seen nothing; the map comes last."""
-        own = () if self.geometry is None else (blank_map(n, device)[None],)
-        return (*self.memory.initial_state(n, device), *own)
+        """The memory of n robots that have seen nothing."""
+        return self.memory.initial_state(n, device)
 
     def forward(
         self,
@@ -109,23 +103,7 @@ class NavActor(PolicyNetwork):
     ) -> tuple[Float[Tensor, "t n hidden"], State]:
         """Features of t steps in a row, arguments as for ``forward``; a critic may share them."""
         parts = [self.goal(vector[..., :GOAL_SIZE]), self.previous(vector[..., GOAL_SIZE:])]
-        if self.geometry is None or self.places is None:
-            return self.memory(depth, torch.cat(parts, -1), state, fresh)
-        *remembered, own = state
-        seen, own = self._follow(depth, vector, own[0], fresh, self.geometry)
-        feature, rest = self.memory(depth, torch.cat([*parts, self.places(seen)], -1), tuple(remembered), fresh)
-        return feature, (*rest, own[None])
-
-    def _follow(
-        self, depth: Tensor | None, vector: Tensor, own: Tensor, fresh: Tensor, geometry: MapGeometry
-    ) -> tuple[Tensor, Tensor]:
-        """What is seen of the map in t steps (t, n, ``MAP_SIZE``), and the map after them."""
-        views = []
-        for t in range(len(vector)):
-            image = None if self.image is None or depth is None else depth[t]
-            view, own = update_map(own, vector[t, :, -PREVIOUS_SIZE:], image, fresh[t], geometry)
-            views.append(view)
-        return torch.stack(views), own
+        return self.memory(depth, torch.cat(parts, -1), state, fresh)
 
     def choose(self, feature: Float[Tensor, "t n hidden"]) -> Float[Tensor, "t n 2"]:
         """Actions in [-1, 1] from features."""

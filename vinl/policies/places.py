@@ -31,16 +31,7 @@ def visit_places(
     """The maps after a step that ended at these positions [m]: 1 there, what was before fades; of a robot whose episode
     is fresh nothing is left."""
     kept = torch.where(fresh[:, None], 0.0, FADE * places)
-    return mark_places(kept, position[:, None], torch.ones_like(fresh)[:, None])
-
-
-def mark_places(
-    places: Float[Tensor, "n cells"], position: Float[Tensor, "n k 2"], chosen: Bool[Tensor, "n k"]
-) -> Float[Tensor, "n cells"]:
-    """The maps with 1 at the chosen ones of k positions [m]."""
-    spare = torch.zeros_like(places[:, :1])  # where the others are written
-    cells = torch.where(chosen, _find_cells(position), CELLS * CELLS)
-    return torch.cat([places, spare], 1).scatter(1, cells, 1.0)[:, :-1]
+    return kept.scatter(1, _find_cells(position)[:, None], 1.0)
 
 
 def view_places(

@@ -71,9 +71,9 @@ class Camera:
 
 
 LOCOMOTION_CAMERA = Camera("locomotion", (0.32, 0.0, 0.0), 0.524, 1.92, 96, 56, 2.0)
-"""Looks 30 deg down at the ground in front of the feet, 110 x 80 deg wide like the Stereolabs ZED X Mini (2.2 mm lens,
-0.1 to 8 m); what all shipped locomotion policies with a camera see through. ViNL has it at 0.35 m, where it looks through a wall that the nose (0.339 m)
-touches."""
+"""Looks 30 deg down at the ground in front of the feet, 110 x 80 deg wide like the Stereolabs ZED X Mini (lens of
+2.2 mm, 0.1 to 8 m); what all shipped locomotion policies with a camera see through. ViNL has it at 0.35 m, where it
+looks through a wall that the nose (0.339 m) touches."""
 
 NAVIGATION_CAMERA = Camera("navigation", (0.32, 0.0, 0.0), 0.0, 1.5708, 80, 60, 10.0, "fill")
 """Looks ahead, level and 90 deg wide; what the shipped navigation policy sees through. ViNL's, at 0.35 m, 15 deg up,
