@@ -21,7 +21,7 @@ from vinl.render.scene import RobotShape, plan_scene
 from vinl.render.video import POSE_DT
 from vinl.robot.rotation import yaw_of
 
-SIZE, INSET = (600, 360), (144, 81)
+SIZE, INSET = (600, 360), (144, 84)
 """Width and height of the picture and of what the locomotion camera sees [pixels]."""
 
 EVERY = 2

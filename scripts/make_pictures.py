@@ -51,7 +51,7 @@ def draw_senses(x: float, y: float, yaw: float) -> np.ndarray:
     picture = renderer.render(view, 1200, 640, positions, rotations, hfov=math.radians(65), shadows=2, samples=3)
     mesh = floorplan_mesh(plan, blocks, ceiling=2.5)
     seen = []
-    for camera, scale in ((LOCOMOTION_CAMERA, 9), (NAVIGATION_CAMERA, 5)):
+    for camera, scale in ((LOCOMOTION_CAMERA, 6), (NAVIGATION_CAMERA, 5)):
         depth = DepthCamera([mesh], camera).render([0], positions[:1], rotations[:1])[0].numpy()
         coloured = mpl.colormaps["viridis_r"](camera.normalise(depth), bytes=True)[..., :3]
         image = np.kron(coloured, np.ones((scale, scale, 1), np.uint8))
