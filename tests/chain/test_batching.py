@@ -76,7 +76,7 @@ def test_batches_say_what_the_policy_says(student: DepthPolicy) -> None:
     batched.reset(5)
     for step in range(6):
         vector = rng.normal(size=(5, 45)).astype(np.float32)
-        depth = torch.as_tensor(rng.uniform(0, 2, (5, 36, 64)), dtype=torch.float32)
+        depth = torch.as_tensor(rng.uniform(0, 2, (5, 56, 96)), dtype=torch.float32)
         np.testing.assert_allclose(batched.act(vector, depth), student.act(vector, depth), atol=1e-5)
         if step == 2:
             mask = np.array([True, False, False, True, False])
@@ -86,7 +86,7 @@ def test_batches_say_what_the_policy_says(student: DepthPolicy) -> None:
 
 def test_those_not_asked_keep_their_memory_and_answer(student: DepthPolicy) -> None:
     rng = np.random.default_rng(0)
-    vector, depth = rng.normal(size=(3, 45)).astype(np.float32), torch.zeros(3, 36, 64)
+    vector, depth = rng.normal(size=(3, 45)).astype(np.float32), torch.zeros(3, 56, 96)
     alone, some = BatchedPolicy(student), BatchedPolicy(student)
     for policy in (alone, some):
         policy.reset(3)

@@ -148,7 +148,7 @@ def test_locomotion_observes_as_vinl_does(example, exported, monkeypatch: pytest
         mujoco.mju_quat2Mat(turn, qpos[3:7])
         turn = turn.reshape(3, 3)
         state = qvel[3:6], -turn[2], qpos[7:], qvel[6:]
-        target = policy.step(*state, command, np.ones((36, 64)))
+        target = policy.step(*state, command, np.ones((56, 96)))
         wanted = observe(np, qpos[None], qvel[None], command[None], last[None], np.zeros((1, 187)))[0]
         wanted = wanted[3:48]  # without the velocity of the trunk
         np.testing.assert_allclose(given[-1], wanted, atol=1e-5)
@@ -196,14 +196,15 @@ def test_depth_images_are_prepared(example: ModuleType, missing: str, reads: flo
     camera = replace(LOCOMOTION_CAMERA, missing=missing)
     about = camera.describe() | {"vfov": 2 * np.arctan(camera.tan_half[1])}
     # a camera with ten times the pixels and some more at each side, that sees a ramp to the left
-    fx = 320 / camera.tan_half[0]
-    prepare = DepthPreparation(about, fx, fx, 399.5, 239.5, 800, 480)
-    left = (399.5 - np.arange(800)) / fx
-    image = np.broadcast_to(1000 * (1.0 + 0.5 * left), (480, 800)).astype(np.uint16)
-    tangents = camera.tan_half[0] * (1 - (2 * np.arange(64) + 1) / 64)
+    fx = 5 * camera.width / camera.tan_half[0]
+    wide, high = 10 * camera.width + 160, 10 * camera.height + 120
+    prepare = DepthPreparation(about, fx, fx, (wide - 1) / 2, (high - 1) / 2, wide, high)
+    left = ((wide - 1) / 2 - np.arange(wide)) / fx
+    image = np.broadcast_to(1000 * (1.0 + 0.5 * left), (high, wide)).astype(np.uint16)
+    tangents = camera.tan_half[0] * (1 - (2 * np.arange(camera.width) + 1) / camera.width)
     seen = prepare(image, 0.001)
-    np.testing.assert_allclose(seen, np.broadcast_to(1.0 + 0.5 * tangents, (36, 64)), atol=3e-3)
-    blank = prepare(np.zeros((480, 800), np.uint16), 0.001)
+    np.testing.assert_allclose(seen, np.broadcast_to(1.0 + 0.5 * tangents, (camera.height, camera.width)), atol=3e-3)
+    blank = prepare(np.zeros((high, wide), np.uint16), 0.001)
     assert (blank == reads).all()
     narrow = DepthPreparation(about, 2 * fx, 2 * fx, 399.5, 239.5, 800, 480)(np.ones((480, 800), np.float32))
     assert narrow[18, 32] == 1.0 and narrow[0, 0] == narrow[18, 0] == reads

@@ -71,7 +71,7 @@ def test_spaces_are_those_of_the_navigator_or_of_the_legs() -> None:
     assert {name: space.shape for name, space in env.observation_space.items()} == sizes
     assert env.action_space.shape == (2,) and env.metadata["render_fps"] == 2
     legs = HomeEnv(floorplans=PLAN, control="joints")
-    sizes = {"goal": (3,), "proprioception": (48,), "depth": (36, 64)}
+    sizes = {"goal": (3,), "proprioception": (48,), "depth": (56, 96)}
     assert {name: space.shape for name, space in legs.observation_space.items()} == sizes
     assert legs.action_space.shape == (12,) and legs.metadata["render_fps"] == 50
 

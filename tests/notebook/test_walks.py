@@ -59,9 +59,9 @@ def test_walk_is_the_episode_of_an_evaluation(walk: vinl.Walk) -> None:
 def test_pictures_of_a_walk(walk: vinl.Walk) -> None:
     assert np.asarray(walk.draw()).std() > 10
     start, later = walk.see(0.0), walk.see(2.0, vinl.NAVIGATION_CAMERA)
-    assert start.shape == (36, 64) and 0.1 < start.min() < start.max() <= 2.0 and later.shape == (60, 80)
+    assert start.shape == (56, 96) and 0.1 < start.min() < start.max() <= 2.0 and later.shape == (60, 80)
     views = walk.draw_views(1.0)
-    assert views.size == (384 + 8 + 288, 216)
+    assert views.size == (370 + 8 + 288, 216)
     with pytest.raises(InputError, match="between 0 and 2 s"):
         walk.see(2.1)
 
