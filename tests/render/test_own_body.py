@@ -1,5 +1,6 @@
-"""The robot does not see itself: its body is not in the depth camera's world, so its legs must not be in the real view.
-The cameras are built into the trunk's nose, whose shell has an opening there."""
+"""The robot does not see itself: its body is not in the depth camera's world. Of the real view its legs must be no
+part, or so little that a robot can take them out (docs/deploy.md). The cameras are built into the trunk's nose, whose
+shell has an opening there."""
 
 from dataclasses import replace
 
@@ -38,11 +39,21 @@ def bodies() -> list[tuple[np.ndarray, np.ndarray]]:
     return found
 
 
-@pytest.mark.parametrize("camera", [LOCOMOTION_CAMERA, NAVIGATION_CAMERA], ids=lambda c: c.name)
-def test_no_leg_is_in_view(camera, bodies):
+def find_legs(camera, bodies) -> np.ndarray:
+    """(poses, height, width): the pixels that show a leg."""
     n = len(bodies)
     depth = DepthCamera(bodies, camera).render(np.arange(n), np.zeros((n, 3)), np.repeat(np.eye(3)[None], n, 0))
-    assert (depth == camera.far).all()
+    return (depth < camera.far).numpy()
+
+
+def test_no_leg_is_in_view_ahead(bodies):
+    assert not find_legs(NAVIGATION_CAMERA, bodies).any()
+
+
+def test_of_the_legs_the_camera_below_sees_a_foot_at_its_lower_edge(bodies):
+    legs = find_legs(LOCOMOTION_CAMERA, bodies)
+    assert not legs[0].any()  # the default pose
+    assert not legs[:, : 2 * LOCOMOTION_CAMERA.height // 3].any() and legs.mean() < 0.002
 
 
 def test_the_test_would_notice(bodies):
