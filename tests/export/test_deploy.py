@@ -206,8 +206,9 @@ def test_depth_images_are_prepared(example: ModuleType, missing: str, reads: flo
     np.testing.assert_allclose(seen, np.broadcast_to(1.0 + 0.5 * tangents, (camera.height, camera.width)), atol=3e-3)
     blank = prepare(np.zeros((high, wide), np.uint16), 0.001)
     assert (blank == reads).all()
-    narrow = DepthPreparation(about, 2 * fx, 2 * fx, 399.5, 239.5, 800, 480)(np.ones((480, 800), np.float32))
-    assert narrow[18, 32] == 1.0 and narrow[0, 0] == narrow[18, 0] == reads
+    half = DepthPreparation(about, 2 * fx, 2 * fx, (wide - 1) / 2, (high - 1) / 2, wide, high)
+    narrow, row = half(np.ones((high, wide), np.float32)), camera.height // 2
+    assert narrow[row, camera.width // 2] == 1.0 and narrow[0, 0] == narrow[row, 0] == reads
 
 
 def test_time_is_told(example: ModuleType, exported, capsys: pytest.CaptureFixture[str]):
