@@ -207,11 +207,10 @@ class Simulation:
         """(spheres, 4) which rows of MJX's contact arrays hold which sphere against the ground, and (k,) which a leg
         against another: they never change."""
 
-        def forward(normalised: Array) -> Array:
-            mx = self._mx.replace(hfield_data=normalised)
-            return mjx.forward(mx, self._start)._impl.contact.geom
+        def collide(normalised: Array) -> Array:
+            return mjx.collision(self._mx.replace(hfield_data=normalised), self._start)._impl.contact.geom
 
-        geom = np.asarray(jax.jit(forward)(self.ground.normalised))
+        geom = np.asarray(jax.jit(collide)(self.ground.normalised))
         on_ground = (geom == self.model.geom("ground").id).any(1)
         rows = np.stack([np.flatnonzero((geom == sphere).any(1) & on_ground) for sphere in self._spheres])
         if rows.size != on_ground.sum():
