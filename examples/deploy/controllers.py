@@ -23,12 +23,14 @@ class OnnxPolicy:
         self.memory = {s["input"]: np.full(s["shape"], s["start"], np.float32) for s in self.about["states"]}
         self.last, self.before = np.zeros(self.session.get_outputs()[0].shape[1], np.float32), None
 
-    def act(self, values, depth):
-        """The action for the rows of the observation table, in SI units, and depth [m]."""
+    def act(self, values, depth, age=0.0):
+        """The action for the rows of the observation table, in SI units, and depth [m] that is so old [s]."""
         observation = self.scale * np.concatenate([values[row["name"]] for row in self.rows])
         inputs = {"observation": np.float32(np.clip(observation, -self.clip, self.clip))[None], **self.memory}
         if "camera" in self.about:
             inputs["depth"] = np.float32(depth)[None]
+        if "image_age" in self.about:
+            inputs["age"] = np.float32([age])
         action, *memory = self.session.run(None, inputs)
         self.memory = dict(zip(self.memory, memory, strict=True))
         return action[0]
@@ -37,12 +39,12 @@ class OnnxPolicy:
 class Locomotion(OnnxPolicy):
     """50 times a second: joint targets [rad]."""
 
-    def step(self, gyro, gravity, joints, joint_speeds, command, depth):
-        """From angular velocity and the direction of gravity in the trunk frame, all in SI units."""
+    def step(self, gyro, gravity, joints, joint_speeds, command, depth, age=0.0):
+        """From angular velocity and the direction of gravity in the trunk frame, all in SI units, and an image."""
         pose, limit = np.array(self.about["default_pose"]), self.about["action_clip"]
         state = {"base_angular_velocity": gyro, "projected_gravity": gravity, "command": command}
         legs = {"joint_position": joints - pose, "joint_velocity": joint_speeds, "previous_action": self.last}
-        self.last = self.act({**state, **legs}, depth)
+        self.last = self.act({**state, **legs}, depth, age)
         return pose + self.about["action_scale"] * np.clip(self.last, -limit, limit)
 
 

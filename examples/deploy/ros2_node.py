@@ -15,6 +15,7 @@ from depth_image import DepthPreparation
 from geometry_msgs.msg import PoseStamped, Twist
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
+from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, Image, JointState
 
 
@@ -51,15 +52,16 @@ class VinlNode(Node):
             if name in self.preparations:
                 kind, unit = (np.uint16, 0.001) if image.encoding == "16UC1" else (np.float32, 1.0)
                 pixels = np.frombuffer(image.data, kind).reshape(image.height, -1)[:, : image.width]
-                self.images[name] = self.preparations[name](pixels, unit), self.get_clock().now()
+                self.images[name] = self.preparations[name](pixels, unit), Time.from_msg(image.header.stamp)
 
         self.create_subscription(CameraInfo, name + "_info", take_info, 1)
         self.create_subscription(Image, name, take_image, 1)
 
     def see(self, name):
-        """The newest prepared image, None if it is older than 0.2 s."""
+        """The newest prepared image and how old it is [s], None if that is more than 0.2 s."""
         image, taken = self.images.get(name, (None, None))
-        return image if taken and (self.get_clock().now() - taken).nanoseconds < 0.2e9 else None
+        age = (self.get_clock().now() - taken).nanoseconds / 1e9 if taken else np.inf
+        return (image, age) if age < 0.2 else None
 
     def take_goal(self, message):
         """A new episode: the memory of the navigation policy begins anew."""
@@ -68,12 +70,12 @@ class VinlNode(Node):
 
     def navigate(self):
         """Choose the command; stand where something is missing or the goal is reached."""
-        depth, self.command = self.see("depth_ahead"), np.zeros(3)
-        if self.goal is not None and self.odom is not None and depth is not None:
+        seen, self.command = self.see("depth_ahead"), np.zeros(3)
+        if self.goal is not None and self.odom is not None and seen is not None:
             at, turn = self.odom.pose.pose.position, self.trunk_rotation()
             pose = np.array([at.x, at.y, np.arctan2(turn[1, 0], turn[0, 0])])
             if np.linalg.norm(self.goal - pose[:2]) > self.navigation.about["success_radius"]:
-                self.command = self.navigation.step(pose, self.goal, depth)
+                self.command = self.navigation.step(pose, self.goal, seen[0])
         if self.locomotion is None:
             message = Twist()
             message.linear.x, message.linear.y, message.angular.z = map(float, self.command)
@@ -81,14 +83,14 @@ class VinlNode(Node):
 
     def walk(self):
         """Publish joint targets; the driver holds them with the gains kp and kd of the metadata."""
-        depth = self.see("depth_near")
-        if self.odom is None or self.joints is None or depth is None:
+        seen = self.see("depth_near")
+        if self.odom is None or self.joints is None or seen is None:
             return
         names, twist = self.locomotion.about["joint_names"], self.odom.twist.twist
         order = [self.joints.name.index(name) for name in names]
         gyro = np.array([twist.angular.x, twist.angular.y, twist.angular.z])
         joints, speeds = np.array(self.joints.position)[order], np.array(self.joints.velocity)[order]
-        target = self.locomotion.step(gyro, -self.trunk_rotation()[2], joints, speeds, self.command, depth)
+        target = self.locomotion.step(gyro, -self.trunk_rotation()[2], joints, speeds, self.command, *seen)
         message = JointState(name=names, position=target.tolist())
         message.header.stamp = self.get_clock().now().to_msg()
         self.targets.publish(message)

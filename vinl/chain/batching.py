@@ -36,6 +36,7 @@ class BatchedPolicy:
 
     Attributes:
         rows: numbers of the robots that are asked for, see ``ask_only``; None: all.
+        dates_images: as the policy's.
     """
 
     def __init__(self, policy: DepthPolicy | LocomotionPolicy) -> None:
@@ -44,6 +45,7 @@ class BatchedPolicy:
         self.rows: Sequence[int] | None = None
         self._network = policy.network
         self._sees = isinstance(policy, DepthPolicy)
+        self.dates_images = isinstance(policy, DepthPolicy) and policy.dates_images
         self._device = policy.device
         self._state: State = ()
         self._fresh = torch.zeros(0, dtype=torch.bool)
@@ -59,12 +61,15 @@ class BatchedPolicy:
         if self._sees:
             self._state = cast(DepthNetwork, self._network).initial_state(which, self._device)
 
-    def act(self, observation: Float[np.ndarray, "n k"], depth: Any = None) -> Float[np.ndarray, "n actions"]:
+    def act(
+        self, observation: Float[np.ndarray, "n k"], depth: Any = None, age: Any = None
+    ) -> Float[np.ndarray, "n actions"]:
         """Actions of the robots in ``rows``; the others keep their last ones.
 
         Args:
             observation: (n, k) scaled observations.
             depth: (n, height, width) [m], if the policy has a camera.
+            age: (n,) of the images [s], see ``DepthPolicy.act``.
         """
         chosen = range(len(observation)) if self.rows is None else self.rows
         sizes = find_safe_sizes(self._network) if self._device.type == "cpu" else (max(len(chosen), 1),)
@@ -75,11 +80,11 @@ class BatchedPolicy:
                 asked = list(chosen[first : first + count])
                 first += count
                 some = torch.tensor(asked + asked[:1] * (size - len(asked)), device=self._device)
-                answer = self._ask(inputs[some], depth, some, len(asked))
+                answer = self._ask(inputs[some], depth, age, some, len(asked))
                 self._answers[asked] = answer[: len(asked)].cpu().numpy()
         return self._answers.copy()
 
-    def _ask(self, inputs: Tensor, depth: Any, some: Tensor, count: int) -> Tensor:
+    def _ask(self, inputs: Tensor, depth: Any, age: Any, some: Tensor, count: int) -> Tensor:
         """One call; the first ``count`` robots are those asked for."""
         if not self._sees:
             return self._network(inputs)
@@ -89,7 +94,10 @@ class BatchedPolicy:
             seen = torch.as_tensor(depth)[some.to(depth.device) if isinstance(depth, Tensor) else some]
             image = prepare_depth(self.camera, seen.to(self._device, torch.float32))
         state = tuple(part[:, some] for part in self._state)
-        answer, state = self._network(image[None], inputs[None], state, self._fresh[some][None])
+        given: tuple[Any, ...] = image[None], inputs[None], state, self._fresh[some][None]
+        if self.dates_images and age is not None:
+            given += (torch.as_tensor(age, dtype=torch.float32, device=self._device)[some][None],)
+        answer, state = self._network(*given)
         real = some[:count]
         for part, new in zip(self._state, state, strict=True):
             part[:, real] = new[:, :count]

@@ -12,7 +12,7 @@ from vinl.chain.ground_reader import GaitReader, map_plan
 from vinl.config.errors import InputError
 from vinl.gait.observation import SENSED_TABLE, insert_gait
 from vinl.policies.card import PolicyCard, find_gait
-from vinl.policies.policy import Policy
+from vinl.policies.policy import DatesImages, Policy
 from vinl.robot.aliengo import DEFAULT_POSE
 from vinl.robot.observation import PROPRIOCEPTION_SIZE, observe
 from vinl.world.boxes import Blocks
@@ -91,6 +91,8 @@ class LocomotionController:
             observation = insert_gait(np, observation, gait_rows)
         if self._cameras is None:
             answer = self.policy.act(observation)
+        elif isinstance(self.policy, DatesImages) and self.policy.dates_images:
+            answer = self.policy.act(observation, self._cameras.look(qpos, rows), self._cameras.age)
         else:
             answer = self.policy.act(observation, self._cameras.look(qpos, rows))
         self.actions = check_actions(answer, len(qpos), self.policy)

@@ -32,6 +32,9 @@ class DepthCameras:
         meshes: the worlds, vertices (v, 3) [m] and faces (f, 3).
         worlds: (n,) the world that each robot is in.
         floor: height of a level floor that the meshes leave out [m]; None: they have it.
+
+    Attributes:
+        age: (n,) of the images [s]: none.
     """
 
     def __init__(
@@ -40,7 +43,7 @@ class DepthCameras:
         self.camera = camera
         self._depth = DepthCamera(meshes, camera, floor=floor)
         self._mount, self._turn = np.array(camera.position), camera.rotation()
-        self._worlds = np.asarray(worlds, dtype=np.int32)
+        self._worlds, self.age = np.asarray(worlds, dtype=np.int32), np.zeros(len(worlds))
         self._renders: dict[int, PreparedRender] = {}
         self._images = torch.full((len(worlds), camera.height, camera.width), camera.far)
 
@@ -146,6 +149,9 @@ class RealCameras:
     Args:
         keys: (n,) that the random numbers follow from.
         errors: notes where the robots were.
+
+    Attributes:
+        age: (n,) of the images when they come [s]. An image's time stamp tells it, so that it is no secret.
     """
 
     def __init__(self, cameras: DepthCameras, config: SensorConfig, keys: np.ndarray, errors: CameraErrors) -> None:
@@ -154,6 +160,7 @@ class RealCameras:
         self._sensor = DepthSensor(config, self.camera, n)
         self._sensor.restart(_as_keys(keys), torch.ones(n, dtype=torch.bool))
         self._delay = np.round(self._sensor.drawn["delay"].numpy() / CONTROL_DT).astype(int)
+        self.age = self._delay * CONTROL_DT
         roll, pitch, height = self._sensor.drawn["offset"].numpy().astype(np.float64).T
         self._raised, self._turned = height, mount_errors(np, roll, pitch)
         self._images = torch.full((n, self.camera.height, self.camera.width), self.camera.far)

@@ -11,7 +11,7 @@ from vinl.chain.config import EvaluationConfig
 from vinl.chain.controller import ACTION_LIMIT
 from vinl.config.errors import InputError
 from vinl.config.loader import closest
-from vinl.export.step import DEPTH, NEXT, StateInput, Step
+from vinl.export.step import AGE, DEPTH, NEXT, StateInput, Step
 from vinl.gait.path import LOAD_AHEAD, LOOK_AHEAD
 from vinl.policies.card import PolicyCard
 from vinl.policies.depth_policy import DepthPolicy
@@ -73,6 +73,8 @@ _MISSING = {
 }
 """What a robot's program has to do with pixels without a return, by ``Camera.missing``."""
 
+_AGE = "time since the image was taken, by its time stamp, up to 0.14; 0 if it is not known"
+
 FORMAT = 1
 """Version of the metadata."""
 
@@ -94,6 +96,7 @@ def describe_step(policy: LocomotionPolicy | DepthPolicy, step: Step) -> dict[st
         "states": [_describe_state(state) for state in step.states],
         **(_describe_navigation(card) if card.kind == "navigation" else _describe_locomotion(card)),
         **({} if policy.camera is None else _describe_camera(policy.camera)),
+        **({"image_age": {"input": AGE, "unit": "s", "meaning": _AGE}} if step.dates_images else {}),
     }
 
 

@@ -22,11 +22,12 @@ from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.chain.records import Episode
 from vinl.chain.rollout import InterruptedRunError, run_episodes
 from vinl.export.metadata import read_metadata
-from vinl.export.step import DEPTH, OBSERVATION
+from vinl.export.step import AGE, DEPTH, OBSERVATION
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.io import load_policy
 from vinl.policies.policy import LocomotionPolicy, Policy
 from vinl.robot.aliengo import CONTROL_DT
+from vinl.sensing.sensor_config import SensorConfig
 from vinl.world.clutter import CLUTTER
 from vinl.world.readers import load_floorplan
 
@@ -42,11 +43,12 @@ WALKER = "blind"
 
 @dataclass
 class Sequence:
-    """The steps of one robot from the start of its episode: scaled observations (k,), depths (height, width) [m], none
-    if the policy sees none, and actions (a,)."""
+    """The steps of one robot from the start of its episode: scaled observations (k,), depths (height, width) [m] and
+    their ages [s], none if the policy sees or dates none, and actions (a,)."""
 
     observations: list[np.ndarray] = field(default_factory=list)
     depths: list[np.ndarray] = field(default_factory=list)
+    ages: list[float] = field(default_factory=list)
     actions: list[np.ndarray] = field(default_factory=list)
 
     def __len__(self) -> int:
@@ -59,6 +61,7 @@ class StepRecorder:
 
     def __init__(self, policy: LocomotionPolicy | DepthPolicy, steps: int, on_step: Callable[[int], None]) -> None:
         self.card, self.camera = policy.card, policy.camera
+        self.dates_images = isinstance(policy, DepthPolicy) and policy.dates_images
         self.done: list[Sequence] = []
         self.ended: set[int] = set()
         self._policy, self._left, self._steps, self._on_step = policy, steps, steps, on_step
@@ -76,15 +79,18 @@ class StepRecorder:
         self.done += self._rows
         self.ended = set()
 
-    def act(self, observation: Any, depth: Any = None) -> Any:
-        """See ``Policy.act``."""
-        answer = self._policy.act(observation, depth)
+    def act(self, observation: Any, depth: Any = None, age: Any = None) -> Any:
+        """See ``DatesImages.act``."""
+        seen = (depth, age) if isinstance(self._policy, DepthPolicy) else (depth,)
+        answer = self._policy.act(observation, *seen)
         for row, sequence in enumerate(self._rows):
             if row in self.ended or self.is_full:
                 continue
             sequence.observations.append(np.array(observation[row], np.float32))
             if depth is not None:
                 sequence.depths.append(np.asarray(torch.as_tensor(depth[row])).astype(np.float32))
+            if age is not None:
+                sequence.ages.append(float(age[row]))
             sequence.actions.append(np.array(answer[row], np.float32))
             self._left -= 1
         self._on_step(self._steps - self._left)
@@ -94,12 +100,12 @@ class StepRecorder:
 def record_steps(
     policy: LocomotionPolicy | DepthPolicy, steps: int, on_step: Callable[[int], None] = lambda _: None
 ) -> list[Sequence]:
-    """Walk through a shipped home, through clutter, until a policy was asked so often in all episodes together;
-    ``on_step`` is called with the steps so far.
+    """Walk through a shipped home, through clutter and with late images, until a policy was asked so often in all
+    episodes together; ``on_step`` is called with the steps so far.
 
     A locomotion policy is driven by the navigator that knows the floor plan, a navigation policy drives ``WALKER``.
     """
-    recorder, config = StepRecorder(policy, steps, on_step), EvaluationConfig()
+    recorder, config = StepRecorder(policy, steps, on_step), EvaluationConfig(sensors=SensorConfig(delay=(0.0, 0.06)))
     locomotion: Policy = recorder
     navigator: Navigator
     if policy.card.kind == "navigation":
@@ -175,11 +181,13 @@ class ExportedPolicy:
             one["input"]: np.broadcast_to(np.float32(one["start"]), one["shape"]).astype(np.float32) for one in states
         }
 
-    def act(self, observation: np.ndarray, depth: np.ndarray | None = None) -> np.ndarray:
-        """The action (a,) for a scaled observation (k,) and depth (height, width) [m], if it sees."""
+    def act(self, observation: np.ndarray, depth: np.ndarray | None = None, age: float | None = None) -> np.ndarray:
+        """The action (a,) for a scaled observation (k,) and depth (height, width) [m] of some age [s], if it sees."""
         given = {OBSERVATION: observation[None], **self._states}
         if depth is not None:
             given[DEPTH] = depth[None]
+        if age is not None:
+            given[AGE] = np.array([age], np.float32)
         action, *states = self._session.run(None, given)
         self._states = dict(zip(self._states, states, strict=True))
         return action[0]
@@ -192,7 +200,8 @@ def compare_steps(exported: ExportedPolicy, recorded: list[Sequence]) -> Parity:
         exported.reset()
         for k, (observation, action) in enumerate(zip(sequence.observations, sequence.actions, strict=True)):
             begin = time.thread_time()
-            answer = exported.act(observation, sequence.depths[k] if sequence.depths else None)
+            depth, age = sequence.depths[k] if sequence.depths else None, sequence.ages[k] if sequence.ages else None
+            answer = exported.act(observation, depth, age)
             spent.append(time.thread_time() - begin)
             worst = float(np.maximum(worst, np.abs(answer - action).max()))  # keeps NaN, unlike max
             largest = max(largest, float(np.abs(action).max()))

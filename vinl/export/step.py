@@ -13,7 +13,7 @@ from vinl.policies.depth_policy import DepthNetwork, DepthPolicy
 from vinl.policies.policy import LocomotionPolicy
 from vinl.sensing.preparation import prepare_depth
 
-OBSERVATION, DEPTH, ACTION = "observation", "depth", "action"
+OBSERVATION, DEPTH, AGE, ACTION = "observation", "depth", "age", "action"
 """Names of the inputs and the output that are not memory."""
 
 MEMORY = ("hidden", "cell")
@@ -45,6 +45,7 @@ class Step(nn.Module):
     Attributes:
         states: what it remembers; empty for a policy without memory.
         camera: whose depth it takes; None for one that sees none.
+        dates_images: whether it takes the age of the image too.
 
     Raises:
         InputError: the network remembers something that has no name.
@@ -56,6 +57,7 @@ class Step(nn.Module):
         self.states: tuple[StateInput, ...] = ()
         self.camera = policy.camera
         self._sees, self._told = isinstance(policy, DepthPolicy), False
+        self.dates_images = isinstance(policy, DepthPolicy) and policy.dates_images
         if not self._sees:
             return
         network = cast(DepthNetwork, policy.network)
@@ -71,7 +73,8 @@ class Step(nn.Module):
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs in their order."""
-        return (OBSERVATION, *((DEPTH,) if self.camera else ()), *(state.name for state in self.states))
+        image = ((DEPTH,) if self.camera else ()) + ((AGE,) if self.dates_images else ())
+        return (OBSERVATION, *image, *(state.name for state in self.states))
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -82,11 +85,12 @@ class Step(nn.Module):
         """Inputs of the right shapes, for the tracer."""
         observation = torch.zeros(1, self.network.observation_size)
         depth = (torch.ones(1, self.camera.height, self.camera.width),) if self.camera else ()
-        return (observation, *depth, *(state.start for state in self.states))
+        age = (torch.zeros(1),) if self.dates_images else ()
+        return (observation, *depth, *age, *(state.start for state in self.states))
 
     def forward(self, observation: Any, *rest: Any) -> tuple[Any, ...]:
         """The action (1, a) and the states after it, from the observation (1, k), depth (1, height, width) [m] if the
-        policy sees, and the states before."""
+        policy sees and its age (1,) [s] if that is asked for, and the states before."""
         if not self._sees:
             return (self.network(observation),)
         image, states = observation[:, :1, None], rest
@@ -97,5 +101,6 @@ class Step(nn.Module):
             action, after = self.network(image[None], observation[None], states, fresh)
             return (action[0], *after)
         *states, begun = states
-        action, after = self.network(image[None], observation[None], tuple(states), begun < 0.5)
+        age = (states.pop(0)[None],) if self.dates_images else ()
+        action, after = self.network(image[None], observation[None], tuple(states), begun < 0.5, *age)
         return (action[0], *after, (begun + 1.0).clip(max=1.0))

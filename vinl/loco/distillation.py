@@ -75,6 +75,7 @@ class Distillation:
         self._starts = [tuple(torch.zeros_like(x) for x in self._network_state()) for _ in range(t // config.bptt)]
         self._vector = torch.zeros(n, SENSED_TABLE.size, device=device)
         self._depth = torch.zeros(n, *(student.image or (0, 0)), dtype=torch.float16, device=device)
+        self._age = torch.zeros(n, device=device)
         self._truth = Prediction(torch.zeros(n, 3, device=device), torch.zeros(n, len(POINTS), device=device))
         self._told = torch.zeros(n, 1, dtype=torch.bool, device=device)
         self._action = torch.zeros(n, student.action_size, device=device)
@@ -99,6 +100,7 @@ class Distillation:
             self._vector.copy_(obs["policy"][:, _SENSED])
             for kept, name in (
                 (self._depth, "depth"),
+                (self._age, "age"),
                 (self._truth.velocity, "velocity"),
                 (self._truth.heights, "heights"),
             ):
@@ -124,7 +126,7 @@ class Distillation:
             kept.index_copy_(0, step, now[None])
         said, network = student.estimate(inputs[None], memory.network, self._begun[None])
         velocity = torch.where(told, truth.velocity, said[0])
-        heights, map_ = student.survey(self._depth, stance, velocity, memory)
+        heights, map_ = student.survey(self._depth, stance, velocity, memory, self._age)
         self._mapping += torch.stack([((heights - truth.heights) ** 2).sum(), (truth.heights**2).sum()])
         believed = Prediction(velocity, torch.where(told, truth.heights, heights))
         action, gait = student.walk(vector, stance, believed, memory)

@@ -66,8 +66,7 @@ class TerrainCameras:
             self._sensor.restart(self._keys(0), torch.ones_like(self._rows, dtype=torch.bool))
         self._seen = True
         drawn = self._sensor.drawn
-        steps = (drawn["delay"] / CONTROL_DT).round().long()
-        then = self._past[steps, self._rows.long()]
+        then = self._past[self._delay(), self._rows.long()]
         trunk, (roll, pitch, height) = matrix_of(torch, then[:, 3:]), drawn["offset"].unbind(1)
         place = then[:, :3] + trunk @ self._mount
         place[:, 2] += height
@@ -75,6 +74,15 @@ class TerrainCameras:
         depth = self._depth.render_poses(self._world, place, turn)
         depth = self._sensor.spoil(depth, self._rows, self._keys(1), place, turn)
         return settle_missing(self.camera.missing, self.camera.normalise(depth), ~(depth > 0))
+
+    @property
+    def age(self) -> Float[Tensor, " n"]:
+        """Of the images that ``look`` gives [s]."""
+        return self._delay() * CONTROL_DT
+
+    def _delay(self) -> Int[Tensor, " n"]:
+        """In control steps."""
+        return (self._sensor.drawn["delay"] / CONTROL_DT).round().long()
 
     def save_state(self) -> dict[str, Any]:
         """What ``load_state`` takes back."""

@@ -143,8 +143,8 @@ def _saved(x: np.ndarray) -> torch.Tensor:
 
 
 class CameraVecEnv(LocoVecEnv):
-    """More observation groups: ``depth`` (n, H, W) float16 in [0, 1], and what is true of what a student believes,
-    ``heights`` and ``velocity``, see ``environment.Observations``.
+    """More observation groups: ``depth`` (n, H, W) float16 in [0, 1] and its ``age`` (n,) [s], and what is true of what
+    a student believes, ``heights`` and ``velocity``, see ``environment.Observations``.
 
     Args:
         device: torch device; JAX must run on the same kind.
@@ -181,5 +181,5 @@ class CameraVecEnv(LocoVecEnv):
         for name in ("heights", "velocity"):
             observation[name] = seen[name]
         with self._stopwatch.part("render"):
-            observation["depth"] = self.cameras.look(seen["pose"], done)
+            observation["depth"], observation["age"] = self.cameras.look(seen["pose"], done), self.cameras.age
         return observation

@@ -55,6 +55,7 @@ class DepthPolicy:
 
     Attributes:
         camera: the camera that it was trained with, rebuilt from the card; None if it is blind.
+        dates_images: whether it makes use of the age of an image.
     """
 
     def __init__(self, network: PolicyNetwork, card: PolicyCard) -> None:
@@ -66,6 +67,7 @@ class DepthPolicy:
         self.card = card
         self.network = network.eval().requires_grad_(False)
         self.camera = read_camera(card, cast(DepthNetwork, network).image)
+        self.dates_images: bool = getattr(network, "dates_images", False)
         self.device = next(network.parameters()).device
         self._state: State = ()
         self._fresh = torch.zeros(0, dtype=torch.bool, device=self.device)
@@ -89,13 +91,14 @@ class DepthPolicy:
             raise ValueError(f"{self.card.name} remembers {len(self._fresh)} robots, the mask has {len(mask)}")
         self._fresh = self._fresh | mask
 
-    def act(self, observation: Float[A, "n observation"], depth: Any = None) -> Float[A, "n actions"]:
+    def act(self, observation: Float[A, "n observation"], depth: Any = None, age: Any = None) -> Float[A, "n actions"]:
         """Actions for scaled observations and what the camera sees.
 
         Args:
             observation: (n, k) in the order of the card's observation table, numpy or torch, any float type.
             depth: (n, height, width) of ``camera`` [m], numpy or torch, 0 or less for a pixel without a return; None if
                 the policy is blind.
+            age: (n,) how long ago the images were taken [s], in as far as ``dates_images``; None: now.
 
         Returns:
             (n, a) of the observation's kind and on its device; numpy as float32.
@@ -113,7 +116,10 @@ class DepthPolicy:
         with torch.no_grad():
             image = self._see(depth, n)
             vector = torch.as_tensor(observation, dtype=torch.float32, device=self.device)
-            action, self._state = self.network(image[None], vector[None], self._state, self._fresh[None])
+            given: tuple[Any, ...] = image[None], vector[None], self._state, self._fresh[None]
+            if self.dates_images and age is not None:
+                given += (torch.as_tensor(age, dtype=torch.float32, device=self.device)[None],)
+            action, self._state = self.network(*given)
             self._fresh = torch.zeros_like(self._fresh)
             if isinstance(observation, Tensor):
                 return action[0].to(observation.device, observation.dtype)

@@ -17,6 +17,7 @@ from torch import Tensor, nn
 
 from vinl.gait.local_map import POINTS, WALL
 from vinl.gait.proprioception import into_heading_frame
+from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import Camera
 
 CELL = 0.025
@@ -32,6 +33,9 @@ UNSEEN = -10.0
 NEAR = 1.1
 """Points farther ahead of the trunk's middle are not used [m]: there a row of the image is wider than a cell of the
 planner, and an angle's error lifts the floor to an obstacle."""
+
+AGES = 8
+"""Control steps of which the poses are remembered: images are up to 0.14 s old when they come."""
 
 _BLEND = 0.5
 """How far a cell moves to what the newest image shows."""
@@ -57,10 +61,13 @@ class MapState(NamedTuple):
     Attributes:
         pose: (n, 3) x, y [m] and heading [rad] since the episode began, by dead reckoning.
         heights: (n, 12544) of the highest point in each cell above the floor [m]; ``UNSEEN``.
+        recent: (n, 8, 13) how the robot stood in the last control steps, the newest first: its pose, the axes of its
+            heading frame in the trunk's, and the height of the floor in that frame [m]; zeros before the episode.
     """
 
     pose: Tensor
     heights: Tensor
+    recent: Tensor
 
 
 class ElevationMap(nn.Module):
@@ -95,14 +102,14 @@ class ElevationMap(nn.Module):
     @staticmethod
     def start(n: int, device: torch.device | str | None = None) -> MapState:
         """Maps of n robots that have seen nothing."""
-        return MapState(torch.zeros(n, 3, device=device), torch.full((n, SIDE**2), UNSEEN, device=device))
+        unseen = torch.full((n, SIDE**2), UNSEEN, device=device)
+        return MapState(torch.zeros(n, 3, device=device), unseen, torch.zeros(n, AGES, 13, device=device))
 
     @staticmethod
     def forget(state: MapState, fresh: Bool[Tensor, " n"]) -> MapState:
         """The maps, empty for those who begin anew."""
-        return MapState(
-            torch.where(fresh[:, None], 0.0, state.pose), torch.where(fresh[:, None], UNSEEN, state.heights)
-        )
+        pose, heights = (torch.where(fresh[:, None], x, y) for x, y in zip((0.0, UNSEEN), state[:2], strict=True))
+        return MapState(pose, heights, torch.where(fresh[:, None, None], 0.0, state.recent))
 
     def move(self, state: MapState, motion: Float[Tensor, "n 4"]) -> MapState:
         """After a control step.
@@ -119,7 +126,7 @@ class ElevationMap(nn.Module):
         stale = _place(before) != _place(after)  # (n, 2, SIDE): columns and rows that stand for other ground now
         heights = state.heights.reshape(-1, SIDE, SIDE)
         heights = torch.where(stale[:, 0, :, None] | stale[:, 1, None, :], UNSEEN, heights)
-        return MapState(pose, heights.reshape(-1, SIDE**2))
+        return MapState(pose, heights.reshape(-1, SIDE**2), state.recent)
 
     def see(
         self,
@@ -127,21 +134,27 @@ class ElevationMap(nn.Module):
         image: Float[Tensor, "n height width"],
         axes: Float[Tensor, "n 3 3"],
         floor: Float[Tensor, " n"],
+        age: Float[Tensor, " n"] | None = None,
     ) -> MapState:
-        """With what an image shows.
+        """With what an image shows, from where the robot was when it was taken; once in every control step.
 
         Args:
             state: before it.
             image: depth as a fraction of the camera's far limit; negative where nothing returned.
-            axes: of the heading frame in the trunk's.
-            floor: height of the floor under the legs in the heading frame [m].
+            axes: of the heading frame in the trunk's, now.
+            floor: height of the floor under the legs in the heading frame [m], now.
+            age: of the image [s]; None: it is of now.
         """
+        now = torch.cat([state.pose, axes.flatten(1), floor[:, None]], 1)
+        recent = torch.cat([now[:, None], state.recent[:, :-1]], 1)
+        then = now if age is None else _stood(recent, age)
+        pose, axes, floor = then[:, :3], then[:, 3:12].unflatten(1, (3, 3)), then[:, 12]
         depth = image.flatten(1).float()
         points = into_heading_frame(axes, self.eye + self.rays * (depth * self.far)[..., None])
         ahead, z = points[..., 0], points[..., 2] - floor[:, None]
         known = (depth > 0) & (depth < 1) & (ahead < NEAR)
         z = z - _tilt(z, ahead, known)
-        cells = self._index(state.pose, points[..., :2])
+        cells = self._index(pose, points[..., :2])
         blank = torch.full_like(state.heights, UNSEEN)
         top = blank.scatter_reduce(1, cells, torch.where(known, z, UNSEEN), "amax")
         seen = top > 0.5 * UNSEEN
@@ -151,7 +164,7 @@ class ElevationMap(nn.Module):
         lowered = torch.where(top > _ROUGH, 0.0, _WEAR * rise)
         rise = torch.where(wall & (rise < 0), lowered, _BLEND * rise)
         blended = torch.where(state.heights > 0.5 * UNSEEN, state.heights + rise, top)
-        return MapState(state.pose, torch.where(seen, blended, state.heights))
+        return MapState(state.pose, torch.where(seen, blended, state.heights), recent)
 
     def read(self, state: MapState) -> Float[Tensor, "n 741"]:
         """Heights above the floor at the planner's points [m]; what was never seen is level floor.
@@ -184,6 +197,13 @@ def _turned(angle: Float[Tensor, " n"], xy: Float[Tensor, "n k 2"]) -> Float[Ten
     c, s = torch.cos(angle)[:, None], torch.sin(angle)[:, None]
     x, y = xy.unbind(-1)
     return torch.stack([c * x - s * y, s * x + c * y], -1)
+
+
+def _stood(recent: Float[Tensor, "n ages 13"], age: Float[Tensor, " n"]) -> Float[Tensor, "n 13"]:
+    """How the robots stood that long ago; those that had not begun stand as they do now."""
+    steps = (age / CONTROL_DT).round().long().clamp(0, AGES - 1)
+    then = recent.gather(1, steps[:, None, None].expand(-1, 1, recent.shape[2]))[:, 0]
+    return torch.where((then == 0).all(1, keepdim=True), recent[:, 0], then)
 
 
 def _place(cell: Int[Tensor, "n 2"]) -> Int[Tensor, "n 2 side"]:

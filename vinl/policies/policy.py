@@ -38,6 +38,21 @@ class Policy(Protocol):
         ...
 
 
+@runtime_checkable
+class DatesImages(Policy, Protocol):
+    """A policy that can be told how old an image is.
+
+    Attributes:
+        dates_images: whether it makes use of that.
+    """
+
+    dates_images: bool
+
+    def act(self, observation: Any, depth: Any = None, age: Any = None) -> Any:
+        """See ``Policy.act``; ``age`` (n,) of the images [s]."""
+        ...
+
+
 class LocomotionPolicy:
     """Observations (n, card.observation_size) to actions (n, 12) at 50 Hz, without noise, on the device of its
     network."""

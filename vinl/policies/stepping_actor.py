@@ -82,6 +82,7 @@ class SteppingActor(PolicyNetwork):
     Attributes:
         image: height and width that it takes [pixels]; None: it is blind, and takes the ground for level.
         remembers: whether it remembers; one that does not maps each image by itself [paper IV-B].
+        dates_images: whether it puts what an image shows where it was when that was taken.
     """
 
     sensed_scale: Tensor
@@ -111,6 +112,7 @@ class SteppingActor(PolicyNetwork):
         eye = None if camera is None else build_config(Camera, camera, source="network: camera")
         self.image = None if eye is None else (eye.height, eye.width)
         self.elevation = None if eye is None else ElevationMap(eye)
+        self.dates_images = eye is not None and self.remembers
         self.velocity = nn.Linear(hidden, 3)
         self.actor = step_layers(actor, actions)
         nn.init.normal_(self.velocity.weight, std=0.01)  # it begins with the belief that it stands
@@ -192,13 +194,14 @@ class SteppingActor(PolicyNetwork):
         stance: Stance,
         velocity: Tensor,
         then: Memory,
+        age: Float[Tensor, " n"] | None = None,
     ) -> tuple[Float[Tensor, "n 741"], MapState | None]:
-        """Heights about the robot, and the map after this step's image."""
+        """Heights about the robot, and the map after this step's image, which is ``age`` [s] old."""
         if self.elevation is None or then.map is None or image is None:
             return torch.zeros(len(velocity), len(POINTS), device=velocity.device), None
         felt, axes, _, feet = stance
         now = self.elevation.move(then.map, motion_of(torch, axes, velocity, felt["base_angular_velocity"]))
-        now = self.elevation.see(now, image, axes, floor_under(torch, feet))
+        now = self.elevation.see(now, image, axes, floor_under(torch, feet), age)
         return self.elevation.read(now), now
 
     def begin(self, stance: Stance, memory: Memory, fresh: Bool[Tensor, " n"]) -> Memory:
@@ -242,6 +245,7 @@ class SteppingActor(PolicyNetwork):
         vector: Float[Tensor, "t n 45"],
         state: State,
         fresh: Bool[Tensor, "t n"],
+        age: Float[Tensor, "t n"] | None = None,
     ) -> tuple[Float[Tensor, "t n actions"], State]:
         """Actions of t steps in a row.
 
@@ -249,6 +253,7 @@ class SteppingActor(PolicyNetwork):
             depth: (t, n, H, W) in [0, 1], negative where nothing returned: prepared by the camera record of the card.
             vector: (t, n, 45) scaled ``SENSED_TABLE``.
             fresh: (t, n) an episode begins with this step.
+            age: (t, n) of the images [s]; None: they are of now.
 
         Returns:
             (t, n, 12) actions, and the state after the last step.
@@ -259,7 +264,8 @@ class SteppingActor(PolicyNetwork):
             memory = self.begin(stance, self.unpack(state), fresh[k])
             inputs = self.network_input(vector[k], stance, memory)[None]
             velocity, network = self.estimate(inputs, memory.network, fresh[k : k + 1])
-            heights, map_ = self.survey(None if depth is None else depth[k], stance, velocity[0], memory)
+            image, old = None if depth is None else depth[k], None if age is None else age[k]
+            heights, map_ = self.survey(image, stance, velocity[0], memory, old)
             action, gait = self.walk(vector[k], stance, Prediction(velocity[0], heights), memory, adapt=True)
             actions.append(action)
             state = self.pack(Memory(network, gait, velocity[0], map_))
