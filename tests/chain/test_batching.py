@@ -49,13 +49,14 @@ def ask(policy: DepthPolicy | LocomotionPolicy, groups: list[np.ndarray]) -> np.
     vectors = rng.normal(size=(STEPS, N, policy.card.observation_size)).astype(np.float32)
     shape = (1, 1) if policy.camera is None else (policy.camera.height, policy.camera.width)
     images = torch.as_tensor(rng.uniform(0, 2, (STEPS, N, *shape)), dtype=torch.float32)
+    ages = rng.uniform(0, 0.06, (STEPS, N))
     found = np.zeros((STEPS, N, policy.network.action_size), np.float32)
     for group in groups:
         batched = BatchedPolicy(policy)
         batched.reset(len(group))
         for step in range(STEPS):
             depth = None if policy.camera is None else images[step, group]
-            found[step, group] = batched.act(vectors[step, group], depth)
+            found[step, group] = batched.act(vectors[step, group], depth, ages[step, group])
     return found
 
 
@@ -77,7 +78,8 @@ def test_batches_say_what_the_policy_says(student: DepthPolicy) -> None:
     for step in range(6):
         vector = rng.normal(size=(5, 45)).astype(np.float32)
         depth = torch.as_tensor(rng.uniform(0, 2, (5, 56, 96)), dtype=torch.float32)
-        np.testing.assert_allclose(batched.act(vector, depth), student.act(vector, depth), atol=1e-5)
+        age = rng.uniform(0, 0.06, 5)
+        np.testing.assert_allclose(batched.act(vector, depth, age), student.act(vector, depth, age), atol=1e-5)
         if step == 2:
             mask = np.array([True, False, False, True, False])
             student.reset(mask)

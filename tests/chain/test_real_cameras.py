@@ -9,12 +9,14 @@ import pytest
 import torch
 
 from vinl.chain.config import EvaluationConfig
-from vinl.chain.depth_cameras import CameraErrors, open_depth_cameras
+from vinl.chain.controller import LocomotionController
+from vinl.chain.depth_cameras import CameraErrors, RealCameras, open_depth_cameras
 from vinl.chain.episode import draw_routes, draw_setups
 from vinl.chain.navigators.learned import DeadReckoning
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.chain.rollout import run_episodes
 from vinl.cli.app import main
+from vinl.policies.card import locomotion_card
 from vinl.policies.io import load_policy
 from vinl.robot.aliengo import home_qpos
 from vinl.robot.cameras import NAVIGATION_CAMERA
@@ -26,13 +28,18 @@ from vinl.world.floorplan import FloorPlan
 CAMERA = replace(NAVIGATION_CAMERA, width=40, height=24, missing="fill")
 
 
-def look(plan: FloorPlan, config: SensorConfig, keys: list[int], walked: np.ndarray) -> torch.Tensor:
-    """What the cameras give after the robots went through the poses (steps, n, 19)."""
+def put_on(plan: FloorPlan, config: SensorConfig, keys: list[int], walked: np.ndarray) -> RealCameras:
+    """The cameras of robots that went through the poses (steps, n, 19)."""
     errors = CameraErrors(config, keys)
     cameras = errors.put_on(open_depth_cameras(plan, [Blocks.empty()] * len(keys), CAMERA))
     for qpos in walked:
         errors.note(qpos)
-    return cameras.look(walked[-1]).clone()
+    return cameras
+
+
+def look(plan: FloorPlan, config: SensorConfig, keys: list[int], walked: np.ndarray) -> torch.Tensor:
+    """What these cameras give."""
+    return put_on(plan, config, keys, walked).look(walked[-1]).clone()
 
 
 def walk(n: int, steps: int = 6) -> np.ndarray:
@@ -45,6 +52,36 @@ def test_images_are_as_old_as_drawn(two_rooms: FloorPlan) -> None:
     ideal = open_depth_cameras(two_rooms, [Blocks.empty()] * 2, CAMERA)
     torch.testing.assert_close(late, ideal.look(poses[-4]), atol=1e-5, rtol=0)
     assert not torch.allclose(late, ideal.look(poses[-1]), atol=1e-3)
+
+
+class Listening:
+    """Keeps what it is told of the images."""
+
+    card, camera = locomotion_card("listening", {"class": "none"}), CAMERA
+
+    def __init__(self, dates_images: bool) -> None:
+        self.dates_images, self.told = dates_images, []
+
+    def reset(self, which: int) -> None: ...
+
+    def act(self, observation: np.ndarray, depth: torch.Tensor, *age: np.ndarray) -> np.ndarray:
+        self.told.append(age)
+        return np.zeros((len(observation), 12), np.float32)
+
+
+def test_a_policy_that_dates_images_is_told_how_old_they_are(two_rooms: FloorPlan) -> None:
+    poses, still = walk(6), (np.zeros((6, 18)), np.zeros((6, 3)))
+    late = put_on(two_rooms, SensorConfig(delay=(0.02, 0.06)), list(range(6)), poses)
+    prompt = open_depth_cameras(two_rooms, [Blocks.empty()] * 6, CAMERA)
+    for cameras, ages in ((late, late._sensor.drawn["delay"].numpy()), (prompt, np.zeros(6))):
+        for policy in (Listening(True), Listening(False)):
+            controller = LocomotionController(policy, cameras)
+            controller.reset(6)
+            controller.step(poses[-1], *still)
+            assert len(policy.told[0]) == policy.dates_images
+            if policy.dates_images:
+                np.testing.assert_allclose(policy.told[0][0], ages, atol=0.0101)  # to half a control step
+    assert 0 < np.ptp(late.age) <= 0.04
 
 
 def test_a_mount_that_is_off_moves_the_image(two_rooms: FloorPlan) -> None:

@@ -38,8 +38,9 @@ def check(path: Path, done: Exported, name: str, steps: int):
     assert done.inputs["observation"] == (1, card.observation_size)
     assert ("camera" in about) == ("depth" in done.inputs) == (load_policy(name).camera is not None)
     assert done.outputs["action"] == (1, 12 if card.kind == "locomotion" else 2)
+    assert ("image_age" in about) == ("age" in done.inputs) == (name == "loco")
     assert [state["input"] for state in about["states"]] == [
-        n for n in done.inputs if n not in ("observation", "depth")
+        n for n in done.inputs if n not in ("observation", "depth", "age")
     ]
 
 

@@ -93,6 +93,7 @@ def test_a_late_image_is_the_last_one_and_an_episode_has_no_past(terrain, poses)
     moved[:, 2] += 0.05
     first, now = prompt.look(poses, None), prompt.look(moved, torch.zeros(6))
     assert torch.equal(slow.look(poses, None), first)
+    assert slow.age.tolist() == pytest.approx([0.02] * 6) and not prompt.age.any()
     done = torch.zeros(6)
     done[2] = 1
     seen = slow.look(moved, done)

@@ -50,8 +50,16 @@ def truth(qpos: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def walk(
-    path: np.ndarray, speed: float, yaw_rate: float, spoil=lambda image: image, boxes: Boxes = BAR
+    path: np.ndarray,
+    speed: float,
+    yaw_rate: float,
+    spoil=lambda image: image,
+    boxes: Boxes = BAR,
+    late: int = 0,
+    age: float | None = None,
 ) -> tuple[ElevationMap, MapState]:
+    """The map after a path: images are so many control steps late, and said to be of an age [s]."""
+    told = None if age is None else torch.tensor([age])
     sees, elevation = cameras(boxes), ElevationMap(CAMERA)
     state = elevation.start(1)
     motion = torch.tensor([[speed * CONTROL_DT, 0.0, 0.0, yaw_rate * CONTROL_DT]])
@@ -61,8 +69,8 @@ def walk(
         feet = into_heading_frame(axes, feet_in_trunk(torch, torch.from_numpy(qpos[None, 7:]).float()))
         assert feet[..., 2].mean() == pytest.approx(FOOT_RADIUS - HEIGHT, abs=0.05)
         state = elevation.move(state, motion) if k else state
-        image = spoil(prepare_depth(CAMERA, sees.look(qpos[None])))
-        state = elevation.see(state, image, axes, torch.tensor([-HEIGHT]))
+        image = spoil(prepare_depth(CAMERA, sees.look(path[None, max(k - late, 0)])))
+        state = elevation.see(state, image, axes, torch.tensor([-HEIGHT]), told)
     return elevation, state
 
 
@@ -77,6 +85,28 @@ def test_a_bar_stays_where_it_lies(speed: float, yaw_rate: float) -> None:
     assert np.median(heights[on & seen]) == pytest.approx(0.1, abs=0.01)
     assert (np.abs(heights[on & seen] - 0.1) < 0.02).mean() > 0.9
     assert (heights[off] == 0).mean() > 0.97
+
+
+def test_a_late_image_shows_what_was_there_when_it_was_taken() -> None:
+    """60 ms at 0.5 m/s and 0.5 rad/s are 3 cm and 1.7 deg."""
+    path = poses(90, 0.5, 0.5)
+    elevation, prompt = walk(path, 0.5, 0.5)
+    late, unsaid = (walk(path, 0.5, 0.5, late=3, age=age)[1] for age in (0.06, None))
+    torch.testing.assert_close(late.pose, prompt.pose)
+    maps = [elevation.read(state)[0].numpy() > 0.05 for state in (prompt, late, unsaid)]
+    assert maps[0].sum() > 50
+    wrong, off = ((shown != maps[0]).sum() for shown in maps[1:])
+    assert wrong <= 0.1 * maps[0].sum() < 0.3 * maps[0].sum() <= off
+
+
+def test_a_robot_has_not_stood_before_it_began() -> None:
+    path = poses(3, 0.5, 0.0)
+    elevation, late = walk(path, 0.5, 0.0, late=5, age=0.1)
+    moved = elevation.forget(late, torch.tensor([True]))
+    assert not moved.recent.any()
+    turned = (path[0], path[0])
+    one, other = (walk(np.stack(turned), 0.0, 0.0, age=age)[1] for age in (None, 0.1))
+    torch.testing.assert_close(one.heights, other.heights)
 
 
 def test_a_bar_is_as_deep_as_it_is() -> None:
