@@ -45,7 +45,7 @@ class BatchedPolicy:
         self.rows: Sequence[int] | None = None
         self._network = policy.network
         self._sees = isinstance(policy, DepthPolicy)
-        self.dates_images = isinstance(policy, DepthPolicy) and policy.dates_images
+        self.dates_images = policy.dates_images
         self._device = policy.device
         self._state: State = ()
         self._fresh = torch.zeros(0, dtype=torch.bool)

@@ -61,7 +61,7 @@ class StepRecorder:
 
     def __init__(self, policy: LocomotionPolicy | DepthPolicy, steps: int, on_step: Callable[[int], None]) -> None:
         self.card, self.camera = policy.card, policy.camera
-        self.dates_images = isinstance(policy, DepthPolicy) and policy.dates_images
+        self.dates_images = policy.dates_images
         self.done: list[Sequence] = []
         self.ended: set[int] = set()
         self._policy, self._left, self._steps, self._on_step = policy, steps, steps, on_step
@@ -81,8 +81,7 @@ class StepRecorder:
 
     def act(self, observation: Any, depth: Any = None, age: Any = None) -> Any:
         """See ``DatesImages.act``."""
-        seen = (depth, age) if isinstance(self._policy, DepthPolicy) else (depth,)
-        answer = self._policy.act(observation, *seen)
+        answer = self._policy.act(observation, depth, *([age] if self.dates_images else []))
         for row, sequence in enumerate(self._rows):
             if row in self.ended or self.is_full:
                 continue

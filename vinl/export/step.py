@@ -57,7 +57,7 @@ class Step(nn.Module):
         self.states: tuple[StateInput, ...] = ()
         self.camera = policy.camera
         self._sees, self._told = isinstance(policy, DepthPolicy), False
-        self.dates_images = isinstance(policy, DepthPolicy) and policy.dates_images
+        self.dates_images = policy.dates_images
         if not self._sees:
             return
         network = cast(DepthNetwork, policy.network)

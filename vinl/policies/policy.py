@@ -60,6 +60,8 @@ class LocomotionPolicy:
     camera: Camera | None = None
     """It needs no camera."""
 
+    dates_images: bool = False
+
     def __init__(self, network: PolicyNetwork, card: PolicyCard) -> None:
         """Takes the network over: it is put into evaluation mode and its gradients are switched off."""
         self.card = card
