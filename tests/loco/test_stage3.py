@@ -144,7 +144,7 @@ def observe_standing(n: int) -> TensorDict:
     """Robots that stand about as they should, on ground that is random."""
     policy = 0.05 * torch.randn(n, STEPPING_MAP_TABLE.size)
     policy[:, 8] -= 1.0  # gravity
-    truth = {"heights": torch.full((n, 741), 0.05), "velocity": torch.zeros(n, 3)}
+    truth = {"heights": torch.full((n, 741), 0.05), "velocity": torch.zeros(n, 3), "age": torch.zeros(n)}
     truth["velocity"] += torch.tensor([0.4, -0.2, 0.1]) + 0.02 * torch.randn(n, 3)
     return TensorDict({"policy": policy, "depth": torch.rand(n, 18, 32).half(), **truth}, batch_size=[n])
 
