@@ -27,10 +27,8 @@ class OnnxPolicy:
         """The action for the rows of the observation table, in SI units, and depth [m] that is so old [s]."""
         observation = self.scale * np.concatenate([values[row["name"]] for row in self.rows])
         inputs = {"observation": np.float32(np.clip(observation, -self.clip, self.clip))[None], **self.memory}
-        if "camera" in self.about:
-            inputs["depth"] = np.float32(depth)[None]
-        if "image_age" in self.about:
-            inputs["age"] = np.float32([age])
+        seen = (("depth", "camera", depth), ("age", "image_age", age))
+        inputs |= {name: np.float32([value]) for name, key, value in seen if key in self.about}
         action, *memory = self.session.run(None, inputs)
         self.memory = dict(zip(self.memory, memory, strict=True))
         return action[0]
