@@ -65,7 +65,7 @@ class Prediction(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What is remembered from step to step: hidden and cell states of the network, the gait (38 numbers), (n, 3) the
+    """What is remembered from step to step: hidden and cell states of the network, the gait (40 numbers), (n, 3) the
     last prediction of the velocity [m/s], and the elevation map; none for a policy without a camera."""
 
     network: State
