@@ -100,13 +100,11 @@ def test_a_late_image_shows_what_was_there_when_it_was_taken() -> None:
 
 
 def test_a_robot_has_not_stood_before_it_began() -> None:
-    path = poses(3, 0.5, 0.0)
-    elevation, late = walk(path, 0.5, 0.0, late=5, age=0.1)
-    moved = elevation.forget(late, torch.tensor([True]))
-    assert not moved.recent.any()
-    turned = (path[0], path[0])
-    one, other = (walk(np.stack(turned), 0.0, 0.0, age=age)[1] for age in (None, 0.1))
-    torch.testing.assert_close(one.heights, other.heights)
+    begun = np.repeat(poses(1, 0.0, 0.0), 2, 0)
+    (elevation, prompt), (_, late) = (walk(begun, 0.0, 0.0, age=age) for age in (None, 0.1))
+    assert (prompt.heights > 0.05).any()
+    torch.testing.assert_close(late.heights, prompt.heights)
+    assert late.recent.any() and not elevation.forget(late, torch.tensor([True])).recent.any()
 
 
 def test_a_bar_is_as_deep_as_it_is() -> None:

@@ -17,7 +17,7 @@ from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.chain.navigators.recovery import RecoveringNavigator
 from vinl.policies.card import PolicyCard
-from vinl.policies.depth_policy import DepthNetwork, DepthPolicy, State
+from vinl.policies.depth_policy import DepthNetwork, DepthPolicy, State, read_ages
 from vinl.policies.networks import PolicyNetwork
 from vinl.policies.policy import LocomotionPolicy, Policy
 from vinl.robot.cameras import Camera
@@ -74,17 +74,18 @@ class BatchedPolicy:
         chosen = range(len(observation)) if self.rows is None else self.rows
         sizes = find_safe_sizes(self._network) if self._device.type == "cpu" else (max(len(chosen), 1),)
         inputs = torch.as_tensor(np.asarray(observation, np.float32), device=self._device)
+        ages = read_ages(self, age, self._device)
         with torch.no_grad():
             first = 0
             for count, size in split_calls(len(chosen), sizes):
                 asked = list(chosen[first : first + count])
                 first += count
                 some = torch.tensor(asked + asked[:1] * (size - len(asked)), device=self._device)
-                answer = self._ask(inputs[some], depth, age, some, len(asked))
+                answer = self._ask(inputs[some], depth, ages, some, len(asked))
                 self._answers[asked] = answer[: len(asked)].cpu().numpy()
         return self._answers.copy()
 
-    def _ask(self, inputs: Tensor, depth: Any, age: Any, some: Tensor, count: int) -> Tensor:
+    def _ask(self, inputs: Tensor, depth: Any, ages: tuple[Tensor, ...], some: Tensor, count: int) -> Tensor:
         """One call; the first ``count`` robots are those asked for."""
         if not self._sees:
             return self._network(inputs)
@@ -94,10 +95,8 @@ class BatchedPolicy:
             seen = torch.as_tensor(depth)[some.to(depth.device) if isinstance(depth, Tensor) else some]
             image = prepare_depth(self.camera, seen.to(self._device, torch.float32))
         state = tuple(part[:, some] for part in self._state)
-        given: tuple[Any, ...] = image[None], inputs[None], state, self._fresh[some][None]
-        if self.dates_images and age is not None:
-            given += (torch.as_tensor(age, dtype=torch.float32, device=self._device)[some][None],)
-        answer, state = self._network(*given)
+        fresh, dated = self._fresh[some][None], (x[some][None] for x in ages)
+        answer, state = self._network(image[None], inputs[None], state, fresh, *dated)
         real = some[:count]
         for part, new in zip(self._state, state, strict=True):
             part[:, real] = new[:, :count]

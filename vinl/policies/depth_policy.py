@@ -14,7 +14,7 @@ from vinl.config.loader import build_config
 from vinl.policies.card import PolicyCard
 from vinl.policies.depth_memory import State
 from vinl.policies.networks import PolicyNetwork
-from vinl.policies.policy import A
+from vinl.policies.policy import A, DatesImages
 from vinl.robot.cameras import Camera
 from vinl.sensing.preparation import prepare_depth
 
@@ -116,10 +116,8 @@ class DepthPolicy:
         with torch.no_grad():
             image = self._see(depth, n)
             vector = torch.as_tensor(observation, dtype=torch.float32, device=self.device)
-            given: tuple[Any, ...] = image[None], vector[None], self._state, self._fresh[None]
-            if self.dates_images and age is not None:
-                given += (torch.as_tensor(age, dtype=torch.float32, device=self.device)[None],)
-            action, self._state = self.network(*given)
+            ages = (x[None] for x in read_ages(self, age, self.device))
+            action, self._state = self.network(image[None], vector[None], self._state, self._fresh[None], *ages)
             self._fresh = torch.zeros_like(self._fresh)
             if isinstance(observation, Tensor):
                 return action[0].to(observation.device, observation.dtype)
@@ -146,6 +144,13 @@ class DepthPolicy:
                 f"{self.card.name} sees depth {shape}, got {None if depth is None else tuple(depth.shape)}"
             )
         return prepare_depth(self.camera, torch.as_tensor(depth, dtype=torch.float32, device=self.device))
+
+
+def read_ages(policy: DatesImages, age: Any, device: torch.device) -> tuple[Float[Tensor, " n"], ...]:
+    """The ages of images as a network's further argument: none where they are not known, or not asked for."""
+    if age is None or not policy.dates_images:
+        return ()
+    return (torch.as_tensor(age, dtype=torch.float32, device=device),)
 
 
 def read_camera(card: PolicyCard, image: tuple[int, int] | None) -> Camera | None:

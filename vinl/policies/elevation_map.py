@@ -108,7 +108,7 @@ class ElevationMap(nn.Module):
     @staticmethod
     def forget(state: MapState, fresh: Bool[Tensor, " n"]) -> MapState:
         """The maps, empty for those who begin anew."""
-        pose, heights = (torch.where(fresh[:, None], x, y) for x, y in zip((0.0, UNSEEN), state[:2], strict=True))
+        pose, heights = torch.where(fresh[:, None], 0.0, state.pose), torch.where(fresh[:, None], UNSEEN, state.heights)
         return MapState(pose, heights, torch.where(fresh[:, None, None], 0.0, state.recent))
 
     def move(self, state: MapState, motion: Float[Tensor, "n 4"]) -> MapState:
