@@ -90,6 +90,18 @@ def test_sway_keeps_on_and_differs_between_episodes(config, homes):
     assert state["sway"].std(0).numpy() == pytest.approx(1.0, abs=0.06)
 
 
+@pytest.mark.parametrize("seeing", [True, False])
+def test_some_robots_alone_see_what_they_see_among_all(config, homes, seeing):
+    errors = SensorConfig(noise=0.02, pixels=0.05, patches=1.0, delay=(0.04, 0.04))
+    settings = replace(config, sensors=errors, odometry=OdometryConfig((0.02, 0.02)))
+    environment = NavEnvironment(settings if seeing else replace(settings, camera=None), homes)
+    environment.step(torch.full((32, 2), 0.4))
+    rows = torch.tensor([3, 30, 8], dtype=torch.int32)
+    alone, among = environment.observe(rows), environment.observe()
+    assert all(torch.equal(some, all_[rows]) for some, all_ in zip(alone, among, strict=True))
+    assert all(torch.equal(some, all_[rows]) for some, all_ in zip(environment.observe(rows), among, strict=True))
+
+
 def test_the_cameras_errors_reach_the_images(config, homes):
     def look(missing="fill", **errors):
         lens = replace(config.camera, missing=missing)

@@ -235,10 +235,18 @@ class NavEnvironment:
 
     # ---- what a training calls ------------------------------------------------------------------------------------
 
-    def observe(self) -> tuple[Float[Tensor, "n height width"], Float[Tensor, "n k"]]:
-        """Depth and vector of the present state, as in ``NavStep``; the same until the next step."""
+    def observe(
+        self, rows: Int[Tensor, " k"] | None = None
+    ) -> tuple[Float[Tensor, "k height width"], Float[Tensor, "k observation"]]:
+        """Depth and vector of the present state, as in ``NavStep``; the same until the next step.
+
+        Args:
+            rows: (k,) int32 numbers of robots: of these alone; by default of all.
+        """
+        if rows is not None:
+            return self._look(rows)
         if self._observation is None:
-            self._observation = self._look()
+            self._observation = self._look(self._rows)
         return self._observation
 
     def step(self, action: Float[Tensor, "n 2"]) -> NavStep:
@@ -401,7 +409,7 @@ class NavEnvironment:
             never = torch.zeros(self.num_envs, dtype=torch.bool, device=self.device)
             self.state["places"].copy_(visit_places(self.state["places"], self.state["position"], never))
 
-    def _look(self) -> tuple[Tensor, Tensor]:
+    def _look(self, rows: Tensor) -> tuple[Tensor, Tensor]:
         n, state = self.num_envs, self.state
         place, yaw = state["position"], state["yaw"]
         if self._odometry is not None:
@@ -413,19 +421,17 @@ class NavEnvironment:
         last = [state["previous"]]
         if self.config.previous == "both":
             last.insert(0, state["action"])
-        vector = torch.cat([torch.stack([distance, bearing.cos(), bearing.sin()], 1), *last], 1)
+        vector = torch.cat([torch.stack([distance, bearing.cos(), bearing.sin()], 1), *last], 1)[rows]
         if self.camera is None or self._sensor is None:
-            return torch.zeros(n, 0, 0, dtype=torch.float16, device=self.device), vector
-        depth = torch.empty(n, self.camera.height, self.camera.width, dtype=torch.float16, device=self.device)
+            return torch.zeros(len(rows), 0, 0, dtype=torch.float16, device=self.device), vector
+        depth = torch.empty(len(rows), self.camera.height, self.camera.width, dtype=torch.float16, device=self.device)
         self._launch(aim_cameras, n, [self._rules, "chance", self._robots, self._sensor.cameras, "camera", "rotation"])
-        self._launch(
-            render_interior,
-            tuple(depth.shape),
-            [self.homes.homes, self._rules, self._robots, "camera", "rotation", wp.from_torch(depth)],
-        )
+        seen = [wp.from_torch(rows), "camera", "rotation", wp.from_torch(depth)]
+        self._launch(render_interior, tuple(depth.shape), [self.homes.homes, self._rules, self._robots, *seen])
         if self._sensor.config.spoils:
             self._launch(draw_keys, n, ["chance", _DRAWN_AT_LOOK, "key"])
-            depth = self._sensor.spoil(depth, self._rows, self._key, *self._camera_pose, unit=self.camera.far)
+            at, turned = (pose[rows] for pose in self._camera_pose)
+            depth = self._sensor.spoil(depth, rows, self._key[rows], at, turned, unit=self.camera.far)
         return settle_missing(self.camera.missing, depth, ~(depth > 0)), vector
 
     def _launch(self, kernel: Any, dim: int | tuple[int, ...], inputs: list[Any]) -> None:

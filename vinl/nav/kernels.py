@@ -401,13 +401,15 @@ def render_interior(
     homes: Homes,
     rules: Rules,
     robots: Robots,
+    rows: wp.array(dtype=wp.int32),
     position: wp.array(dtype=wp.vec3),
     rotation: wp.array(dtype=wp.mat33),
     depth: wp.array(dtype=wp.float16, ndim=3),
 ):
-    """Depth along the optical axis as a fraction of the far limit, one thread a pixel. Floor and ceiling are planes: no
-    rays are lost on them, and none leaves a home through its floor."""
-    n, row, column = wp.tid()
+    """Depth along the optical axis as a fraction of the far limit, one thread a pixel, of the robots in ``rows``. Floor
+    and ceiling are planes: no rays are lost on them, and none leaves a home through its floor."""
+    k, row, column = wp.tid()
+    n = rows[k]
     direction = rotation[n] * look_through(row, column, depth.shape[1], depth.shape[2], rules.tan_half)
     origin = position[n]
     far = rules.far
@@ -419,4 +421,4 @@ def render_interior(
     hit = wp.mesh_query_ray(homes.meshes[robots.home[n]], origin, direction, far)
     if hit.result:
         far = wp.min(hit.t, far)
-    depth[n, row, column] = wp.float16(far / rules.far)
+    depth[k, row, column] = wp.float16(far / rules.far)
