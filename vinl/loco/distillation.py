@@ -65,7 +65,9 @@ class Distillation:
         self.student.actor.requires_grad_(False)
         self._learned = [p for p in self.student.parameters() if p.requires_grad]
         self.learning_rate, self.teacher_fraction = config.rate_at(0.0), config.teacher_share
-        self.optimizer = torch.optim.Adam(self._learned, lr=self.learning_rate, fused=self.device.type == "cuda")
+        on_gpu = self.device.type == "cuda"
+        self._rate = torch.tensor(self.learning_rate, device=device)
+        self.optimizer = torch.optim.Adam(self._learned, lr=self._rate, fused=on_gpu, capturable=on_gpu)
 
         t, n = config.steps, num_envs
         self._inputs = torch.zeros(t, n, student.vector_size, device=device)
@@ -83,7 +85,10 @@ class Distillation:
         self._order, self._steps = torch.arange(n, device=device)[:, None] / n, torch.arange(t, device=device)
         self._mapping = torch.zeros(2, device=device)  # squared errors of the maps, and squares of the heights
         self._step = 0
-        self._graph = StepGraph(self._walk) if self.device.type == "cuda" else None
+        self._parts, self._totals = min(config.minibatches, n), torch.zeros(2, device=device)
+        self._graph = StepGraph(self._walk) if on_gpu else None
+        # a graph wants minibatches that are all as large
+        self._descent = StepGraph(self._descend) if on_gpu and n % self._parts == 0 else None
 
     def gait(self) -> GaitState:
         """The gait that the student keeps of every robot."""
@@ -154,20 +159,16 @@ class Distillation:
             return self._update()
 
     def _update(self) -> dict[str, float]:
-        c, n = self.config, self._velocity.shape[1]
-        for group in self.optimizer.param_groups:
-            group["lr"] = self.learning_rate
-        parts = min(c.minibatches, n)
-        totals = torch.zeros(2, device=self.device)
-        for _ in range(c.epochs):
-            for robots in torch.randperm(n, device=self.device).chunk(parts):
-                loss = self.loss(robots)
-                self.optimizer.zero_grad(set_to_none=True)
-                (loss / VELOCITY_UNIT**2).backward()
-                norm = nn.utils.clip_grad_norm_(self._learned, c.max_grad_norm)
-                self.optimizer.step()
-                totals += torch.stack([loss, norm]).detach()
-        velocity, norm = (totals / (c.epochs * parts)).tolist()
+        n, epochs = self._velocity.shape[1], self.config.epochs
+        self._rate.fill_(self.learning_rate)
+        self._totals.zero_()
+        for _ in range(epochs):
+            for robots in torch.randperm(n, device=self.device).chunk(self._parts):
+                if self._descent is None:
+                    self._descend(robots)
+                else:
+                    self._descent.run(robots)
+        velocity, norm = (self._totals / (epochs * self._parts)).tolist()
         missed, raised = self._mapping.tolist()
         self._mapping.zero_()
         return {
@@ -176,6 +177,15 @@ class Distillation:
             "gradient_norm": norm,
             "teacher_share": self.teacher_fraction,
         }
+
+    def _descend(self, robots: Tensor) -> None:
+        """One step of the optimiser on some robots' windows."""
+        loss = self.loss(robots)
+        self.optimizer.zero_grad(set_to_none=True)
+        (loss / VELOCITY_UNIT**2).backward()
+        norm = nn.utils.clip_grad_norm_(self._learned, self.config.max_grad_norm)
+        self.optimizer.step()
+        self._totals += torch.stack([loss, norm]).detach()
 
     def loss(self, robots: Tensor) -> Tensor:
         """Mean squared error of each component of the velocity in some robots' windows [(m/s)^2]."""
@@ -212,6 +222,8 @@ class Distillation:
         """Go on from what ``save`` gave."""
         self.student.load_state_dict(loaded_dict["student"], strict=strict)
         self.optimizer.load_state_dict(loaded_dict["optimizer"])
+        for group in self.optimizer.param_groups:
+            group["lr"] = self._rate
         for kept, x in zip(self._state, loaded_dict["memory"], strict=True):
             kept.copy_(x)
         self._begun.copy_(loaded_dict["begun"])
