@@ -23,7 +23,7 @@ from vinl.gait.state import (
     swings,
     turn,
 )
-from vinl.robot.aliengo import FOOT_RADIUS, HIPS, THIGH_ASIDE
+from vinl.robot.aliengo import FOOT_RADIUS, HIPS
 
 ALONG = np.arange(-6, 7) * 0.055
 """(13,) offsets of candidates from Raibert's foothold, along the heading [m]."""
@@ -42,9 +42,6 @@ _INWARD = 0.05, 0.03
 
 EDGE, _SHANK = 0.03, 0.04
 """Footholds cost whose foot is with its surface, whose shank with its axis nearer to a block than this [m]."""
-
-_THIGHS = (HIPS[:, 1] + THIGH_ASIDE).astype(np.float32)
-"""(4,) how far to the left of the trunk's middle the thigh joints lie [m]: shanks lean towards them."""
 
 _NEAR, _ROOM = 200.0, 0.005
 """What each metre nearer costs, and how far that goes [m]: over what is high, it is this or reach."""
@@ -83,8 +80,8 @@ def plan_footholds(
     nominal, heading = raibert(xp, config, gait, velocity, command)
     candidates = constant(xp, CANDIDATES, level)
     points = nominal[:, :, None] + turn(xp, heading[..., None], candidates[None, None])
-    cost = obstruction(xp, config, view, gait, command, points, heading, candidates)
-    leans = constant(xp, np.stack([LEANS, 0 * LEANS], -1), level)[:, None]
+    cost = obstruction(xp, config, view, gait, command, points, heading, candidates[:, 0])
+    leans = constant(xp, LEANS, level)[:, None]
     blocked = obstruction(xp, config, view, gait, command, _tracks(xp, nominal, heading, command), heading, leans)
     side = constant(xp, np.sign(stance_places(config)[:, 1]), level)[:, None]
     inward = xp.clip(-candidates[:, 1] * side - _INWARD[0], 0.0, None) / _INWARD[1]
@@ -112,7 +109,7 @@ def obstruction(
     command: Any,
     points: Any,
     heading: Any,
-    offsets: Any,
+    along: Any,
 ) -> Any:
     """What blocks and the leg's reach cost at footholds.
 
@@ -122,34 +119,23 @@ def obstruction(
         xp, config, view, gait, command: as for ``plan_footholds``.
         points: (n, 4, k, 2) footholds in the heading frame [m]; or (n, 4, 1, k, 2), each with every one of ``along``.
         heading: (n, 4) of the trunk then [rad].
-        offsets: (k, 2) how far ahead of Raibert's footholds, and to the left of them, they are [m]; or (j, 1, 2).
+        along: (k,) how far ahead of Raibert's footholds they are [m]; or (j, 1).
 
     Returns:
         (n, 4, k), or (n, 4, j, k), 0 where nothing is in the way.
     """
-    along, across = offsets[..., 0], offsets[..., 1]
     ones = (1,) * along.ndim
-
-    def by_leg(values: Any) -> Any:
-        return values.reshape(-1, 4, *ones)
-
     ground = view.height(points) + FOOT_RADIUS
-    stands, places = stance_time(xp, config, gait)[:, None] / 2, constant(xp, stance_places(config), along)
-    sweep = command[:, :1] * stands
-    to_hip = constant(xp, HIPS[:, 0].astype(np.float32), along)
-    touch_down = by_leg(places[:, 0] - to_hip + sweep) + along
-    ahead = xp.stack([touch_down, touch_down - 2 * by_leg(sweep + 0 * to_hip)], -1)
-    turned = by_leg(command[:, 2:] * stands * places[:, 0])
-    aside = by_leg(places[:, 1] - constant(xp, _THIGHS, along)) + across
-    aside = xp.stack([aside + turned, aside - turned], -1)
+    sweep = command[:, 0] * stance_time(xp, config, gait)
+    stance = constant(xp, stance_places(config)[:, 0] - HIPS[:, 0].astype(np.float32), along)
+    touch_down = (stance + sweep[:, None] / 2).reshape(-1, 4, *ones) + along
+    ahead = xp.stack([touch_down, touch_down - sweep.reshape(-1, 1, *ones)], -1)
     hip = (gait.hip - FOOT_RADIUS).reshape(-1, 1, *ones, 1)
     back, up = knee_from_foot(xp, ahead, hip + 0 * ahead)
-    in_ = -aside * up / hip
     parts = constant(xp, np.array(SHANK_FRACTIONS, np.float32), along)
-    back, in_, up = ((x[..., None] * parts).reshape(*x.shape[:-1], 2 * len(SHANK_FRACTIONS)) for x in (back, in_, up))
-    c, s = (by_leg(f(heading))[..., None] for f in (xp.cos, xp.sin))
-    lying = xp.stack([c * back - s * in_, s * back + c * in_], -1)
-    leg = xp.concatenate([points[..., None, :] + lying, (ground[..., None] + up)[..., None]], -1)
+    back, up = ((x[..., None] * parts).reshape(*x.shape[:-1], 2 * len(SHANK_FRACTIONS)) for x in (back, up))
+    behind = xp.stack([xp.cos(heading), xp.sin(heading)], -1).reshape(-1, 4, *ones, 1, 2) * back[..., None]
+    leg = xp.concatenate([points[..., None, :] + behind, (ground[..., None] + up)[..., None]], -1)
     foot = xp.concatenate([points, ground[..., None]], -1)
     short = xp.amax(_SHANK - view.clearance(leg), -1)
     too_far = xp.clip(xp.abs(ahead) - farthest(xp, hip), 0.0, None).sum(-1)
