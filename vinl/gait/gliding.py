@@ -12,7 +12,7 @@ from vinl.gait.ground_view import FieldView, build_ground_map
 from vinl.gait.leg import LONGEST, knee_from_foot
 from vinl.gait.path import swing_path
 from vinl.gait.state import aim, stance_places, start_gait, swings, tick
-from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS, HIPS
+from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS, HIPS, THIGH_ASIDE
 from vinl.world.boxes import Boxes
 from vinl.world.grid import BLOCK, GridFrame, flat_field, raise_boxes
 
@@ -56,10 +56,13 @@ def glide(config: GaitConfig, height: float, speed: float, robots: int, depth: f
         feet[..., 2] = np.where(swings(np, config, gait), feet[..., 2], FOOT_RADIUS - qpos[:, 2:3])
         ahead = feet[..., 0] - HIPS[:, 0]
         near = np.abs(qpos[:, 0]) < 1.1
-        in_reach &= ~near | (np.hypot(ahead, feet[..., 2]) < LONGEST).all(1)
+        aside = feet[..., 1] - (HIPS[:, 1] + THIGH_ASIDE)
+        long = np.hypot(aside, feet[..., 2])  # the leg lies in a plane that leans by as much
+        in_reach &= ~near | (np.hypot(ahead, long) < LONGEST).all(1)
         foot |= (view.clearance(feet) < FOOT_RADIUS - 0.002).any(1)
-        back, up = knee_from_foot(np, ahead, -feet[..., 2])
+        back, up = knee_from_foot(np, ahead, long)
+        across, up = -aside * up / long, -feet[..., 2] * up / long
         line = np.linspace(0.1, 1.0, 8)[:, None, None]
-        points = np.stack(np.broadcast_arrays(feet[..., 0] + line * back, feet[..., 1], feet[..., 2] + line * up), -1)
+        points = np.stack([feet[..., k] + line * part for k, part in enumerate((back, across, up))], -1)
         shank |= (view.clearance(np.moveaxis(points, 0, 2)) < _SHANK_RADIUS).any((1, 2))
     return Glide(foot, shank, in_reach)
