@@ -247,10 +247,9 @@ def test_places_on_a_track_cost_the_same_one_by_one() -> None:
     command = np.array([[0.5, 0.0, 0.2]])
     points = np.random.default_rng(0).uniform(-0.8, 0.8, (1, 4, 20, 2))
     heading = np.full((1, 4), 0.1)
-    offsets = np.stack([LEANS, 0 * LEANS], -1)
-    every = obstruction(np, CONFIG, view, gait, command, points[:, :, None], heading, offsets[:, None])
+    every = obstruction(np, CONFIG, view, gait, command, points[:, :, None], heading, LEANS[:, None])
     assert every.shape == (1, 4, len(LEANS), 20)
-    for k, offset in enumerate(offsets):
-        alone = obstruction(np, CONFIG, view, gait, command, points, heading, np.tile(offset, (20, 1)))
+    for k, lean in enumerate(LEANS):
+        alone = obstruction(np, CONFIG, view, gait, command, points, heading, np.full(20, lean))
         np.testing.assert_allclose(every[:, :, k], alone, atol=1e-4)
     assert (every[0, 0, 0] != every[0, 0, -1]).any() and (every == 0).any()
