@@ -40,4 +40,9 @@ def test_episodes_of_one_length_walk_together_and_the_longest_begin(two_rooms: F
     assert [lengths[k] for _, k in walked] == sorted((lengths[k] for _, _, k in missing), reverse=True)
     assert [cell for job in jobs for cell in job.filmed] == [wanted[3][1:]]
     assert max(len(job.cells) for job in jobs) <= LARGEST
-    assert len(jobs) >= min(len(missing), 2 * workers)
+    if workers == 1:  # nobody to share with
+        assert len(jobs) == -(-len(missing) // LARGEST)
+    elif len(missing) <= 4 * workers:  # a call costs as much with one robot as with four
+        assert len(missing) / 4 <= len(jobs) <= workers
+    else:
+        assert len(jobs) >= 2 * workers

@@ -127,7 +127,10 @@ LARGEST = 24
 """Episodes in a piece of work at most: as many as one call of a network holds. More would wait for each other."""
 
 _PIECES = 3
-"""So many pieces of work for each worker, so that none is idle for long at the end."""
+"""So many pieces of work for each of several workers, so that none is idle for long at the end."""
+
+_CALL = 4
+"""Episodes in a piece that cost hardly more than one: no call of a network is smaller, see ``batching.CANDIDATES``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +237,9 @@ def cut_jobs(
     With a policy of one's own they are all episodes of a plan and a seed, whatever is missing of them.
     """
     steady = is_steady(who.locomotor) and is_steady_navigator(who.navigator)
-    size = max(1, min(LARGEST, -(-len(missing) // (workers * _PIECES))))
+    share = -(-len(missing) // workers)
+    pieces = _PIECES if workers > 1 else 1  # one alone waits for nobody
+    size = max(1, min(LARGEST, max(-(-share // pieces), min(share, _CALL))))
     jobs = []
     for number, plan in enumerate(plans):
         lacking = {(seed, k) for name, seed, k in missing if name == plan.name}
