@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vinl.benchmark.protocol import LARGEST, Row, cut_jobs, each_key, longest_first, split_evenly
+from vinl.chain.batching import CANDIDATES
 from vinl.chain.navigators.oracle import OracleNavigator
 from vinl.policies.io import load_policy
 from vinl.world.floorplan import FloorPlan
@@ -42,7 +43,7 @@ def test_episodes_of_one_length_walk_together_and_the_longest_begin(two_rooms: F
     assert max(len(job.cells) for job in jobs) <= LARGEST
     if workers == 1:  # nobody to share with
         assert len(jobs) == -(-len(missing) // LARGEST)
-    elif len(missing) <= 4 * workers:  # a call costs as much with one robot as with four
-        assert len(missing) / 4 <= len(jobs) <= workers
+    elif len(missing) <= CANDIDATES[0] * workers:  # a call costs as much with one robot as with so many
+        assert len(missing) / CANDIDATES[0] <= len(jobs) <= workers
     else:
         assert len(jobs) >= 2 * workers

@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from vinl.chain.batching import is_steady, is_steady_navigator
+from vinl.chain.batching import CANDIDATES, is_steady, is_steady_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_routes, draw_setup
 from vinl.chain.navigators.base import Navigator
@@ -129,9 +129,6 @@ LARGEST = 24
 _PIECES = 3
 """So many pieces of work for each of several workers, so that none is idle for long at the end."""
 
-_CALL = 4
-"""Episodes in a piece that cost hardly more than one: no call of a network is smaller, see ``batching.CANDIDATES``."""
-
 
 @dataclass(frozen=True, eq=False)
 class Row:
@@ -239,7 +236,8 @@ def cut_jobs(
     steady = is_steady(who.locomotor) and is_steady_navigator(who.navigator)
     share = -(-len(missing) // workers)
     pieces = _PIECES if workers > 1 else 1  # one alone waits for nobody
-    size = max(1, min(LARGEST, max(-(-share // pieces), min(share, _CALL))))
+    together = min(share, CANDIDATES[0])  # no call is smaller
+    size = max(1, min(LARGEST, max(-(-share // pieces), together)))
     jobs = []
     for number, plan in enumerate(plans):
         lacking = {(seed, k) for name, seed, k in missing if name == plan.name}
