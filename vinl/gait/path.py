@@ -10,8 +10,9 @@ from vinl.gait.config import GaitConfig
 from vinl.gait.state import GaitState
 from vinl.robot.aliengo import CONTROL_DT
 
-_WAIT = 0.12
-"""At both ends of a swing the foot moves up or down alone, for this fraction of it: the shank follows the foot."""
+_RISES, _SINKS = 0.20, 0.12
+"""At both ends of a swing the foot moves up or down alone, for these fractions of it: a foot is later than its path as
+it lifts off, and the shank follows the foot as it comes down."""
 
 _STEEP = 0.6
 """The height of the path is sin(pi s) to this power: at a tenth of the swing it is at half of its apex."""
@@ -65,7 +66,7 @@ def swing_path(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, later: f
     swinging = gait.phases < fraction
     s = xp.clip(since / fraction, 0.0, 1.0)
     lift = xp.where(swinging[..., None], gait.lift, feet)
-    forth = xp.clip((s - _WAIT) / (1 - 2 * _WAIT), 0.0, 1.0)
+    forth = xp.clip((s - _RISES) / (1 - _RISES - _SINKS), 0.0, 1.0)
     forth = (0.5 - 0.5 * xp.cos(math.pi * forth))[..., None]
     straight = lift + (gait.target - lift) * forth
     bell = (xp.sin(math.pi * s) + 1e-6) ** _STEEP  # s = 1 gives a sine just below 0 in float32
