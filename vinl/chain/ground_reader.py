@@ -156,4 +156,4 @@ class GaitReader:
         velocity = velocity_in_heading_frame(np, qpos, qvel)
         plan = plan_footholds(np, self.config, view, gait, velocity, command, feet)
         self.gait = aim(np, self.config, gait, plan, velocity, command, feet)
-        return command, gait_rows(np, self.config, self.gait, feet) * _SCALE
+        return command, gait_rows(np, self.config, self.gait, feet, np.zeros(len(qpos))) * _SCALE

@@ -23,25 +23,28 @@ from vinl.gait.state import (
     swings,
     turn,
 )
-from vinl.robot.aliengo import FOOT_RADIUS, HIPS
+from vinl.robot.aliengo import FOOT_RADIUS, HIPS, THIGH_ASIDE
 
 ALONG = np.arange(-6, 7) * 0.055
 """(13,) offsets of candidates from Raibert's foothold, along the heading [m]."""
 
-ACROSS = np.arange(-2, 3) * 0.06
-"""(5,) the same across it, to the left [m]."""
+ACROSS = np.arange(-3, 4) * 0.06
+"""(7,) the same across it, to the left [m]."""
 
 CANDIDATES = np.stack(np.meshgrid(ALONG, ACROSS, indexing="ij"), -1).reshape(-1, 2).astype(np.float32)
-"""(65, 2) all of them."""
+"""(91, 2) all of them."""
 
 _WIDTH = (0.15, 0.10)
 """Offsets along and across that cost 1 [m]."""
 
-_INWARD = 0.05, 0.03
-"""A foothold this much nearer to the other side's feet is free; farther in, so much more costs 1 [m]."""
+_BESIDE, _OTHER = (0.18, 0.04), (1, 0, 3, 2)
+"""A foothold this far aside from that of the leg on the other side is free; so much nearer costs 1 [m]."""
 
 EDGE, _SHANK = 0.03, 0.04
 """Footholds cost whose foot is with its surface, whose shank with its axis nearer to a block than this [m]."""
+
+_THIGHS = (HIPS[:, 1] + THIGH_ASIDE).astype(np.float32)
+"""(4,) how far to the left of the trunk's middle the thigh joints lie [m]: shanks lean towards them."""
 
 _NEAR, _ROOM = 200.0, 0.005
 """What each metre nearer costs, and how far that goes [m]: over what is high, it is this or reach."""
@@ -80,11 +83,14 @@ def plan_footholds(
     nominal, heading = raibert(xp, config, gait, velocity, command)
     candidates = constant(xp, CANDIDATES, level)
     points = nominal[:, :, None] + turn(xp, heading[..., None], candidates[None, None])
-    cost = obstruction(xp, config, view, gait, command, points, heading, candidates[:, 0])
-    leans = constant(xp, LEANS, level)[:, None]
+    cost = obstruction(xp, config, view, gait, command, points, heading, candidates)
+    leans = constant(xp, np.stack([LEANS, 0 * LEANS], -1), level)[:, None]
     blocked = obstruction(xp, config, view, gait, command, _tracks(xp, nominal, heading, command), heading, leans)
     side = constant(xp, np.sign(stance_places(config)[:, 1]), level)[:, None]
-    inward = xp.clip(-candidates[:, 1] * side - _INWARD[0], 0.0, None) / _INWARD[1]
+    places = xp.where(swinging[..., None], gait.target, feet)[..., None, :2]
+    other = xp.stack([places[:, leg] for leg in _OTHER], 1)  # an index would be copied to a GPU
+    aside = turn(xp, -heading[..., None], points - other)[..., 1] * side
+    inward = xp.clip(_BESIDE[0] - aside, 0.0, None) / _BESIDE[1]
     cost = cost + ((candidates[:, 0] / _WIDTH[0]) ** 2 + (candidates[:, 1] / _WIDTH[1]) ** 2 + inward**2)
     moved = ((points - gait.target[:, :, None, :2]) ** 2).sum(-1)
     cost = cost + xp.where(swinging[..., None], _CHANGE * xp.clip(moved, 0.0, 0.04), 0.0)
@@ -109,7 +115,7 @@ def obstruction(
     command: Any,
     points: Any,
     heading: Any,
-    along: Any,
+    offsets: Any,
 ) -> Any:
     """What blocks and the leg's reach cost at footholds.
 
@@ -119,26 +125,38 @@ def obstruction(
         xp, config, view, gait, command: as for ``plan_footholds``.
         points: (n, 4, k, 2) footholds in the heading frame [m]; or (n, 4, 1, k, 2), each with every one of ``along``.
         heading: (n, 4) of the trunk then [rad].
-        along: (k,) how far ahead of Raibert's footholds they are [m]; or (j, 1).
+        offsets: (k, 2) how far ahead of Raibert's footholds, and to the left of them, they are [m]; or (j, 1, 2).
 
     Returns:
         (n, 4, k), or (n, 4, j, k), 0 where nothing is in the way.
     """
+    along, across = offsets[..., 0], offsets[..., 1]
     ones = (1,) * along.ndim
+
+    def by_leg(values: Any) -> Any:
+        return values.reshape(-1, 4, *ones)
+
     ground = view.height(points) + FOOT_RADIUS
-    sweep = command[:, 0] * stance_time(xp, config, gait)
-    stance = constant(xp, stance_places(config)[:, 0] - HIPS[:, 0].astype(np.float32), along)
-    touch_down = (stance + sweep[:, None] / 2).reshape(-1, 4, *ones) + along
-    ahead = xp.stack([touch_down, touch_down - sweep.reshape(-1, 1, *ones)], -1)
+    stands, places = stance_time(xp, config, gait)[:, None] / 2, constant(xp, stance_places(config), along)
+    sweep = command[:, :1] * stands
+    to_hip = constant(xp, HIPS[:, 0].astype(np.float32), along)
+    touch_down = by_leg(places[:, 0] - to_hip + sweep) + along
+    ahead = xp.stack([touch_down, touch_down - 2 * by_leg(sweep + 0 * to_hip)], -1)
+    turned = by_leg(command[:, 2:] * stands * places[:, 0])
+    aside = by_leg(places[:, 1] - constant(xp, _THIGHS, along)) + across
+    aside = xp.stack([aside + turned, aside - turned], -1)
     hip = (gait.hip - FOOT_RADIUS).reshape(-1, 1, *ones, 1)
-    back, up = knee_from_foot(xp, ahead, hip + 0 * ahead)
+    long = xp.sqrt(hip**2 + aside**2)  # the leg lies in a plane that leans by as much
+    back, up = knee_from_foot(xp, ahead, long)
+    in_, up = -aside * up / long, up * hip / long
     parts = constant(xp, np.array(SHANK_FRACTIONS, np.float32), along)
-    back, up = ((x[..., None] * parts).reshape(*x.shape[:-1], 2 * len(SHANK_FRACTIONS)) for x in (back, up))
-    behind = xp.stack([xp.cos(heading), xp.sin(heading)], -1).reshape(-1, 4, *ones, 1, 2) * back[..., None]
-    leg = xp.concatenate([points[..., None, :] + behind, (ground[..., None] + up)[..., None]], -1)
+    back, in_, up = ((x[..., None] * parts).reshape(*x.shape[:-1], 2 * len(SHANK_FRACTIONS)) for x in (back, in_, up))
+    c, s = (by_leg(f(heading))[..., None] for f in (xp.cos, xp.sin))
+    lying = xp.stack([c * back - s * in_, s * back + c * in_], -1)
+    leg = xp.concatenate([points[..., None, :] + lying, (ground[..., None] + up)[..., None]], -1)
     foot = xp.concatenate([points, ground[..., None]], -1)
     short = xp.amax(_SHANK - view.clearance(leg), -1)
-    too_far = xp.clip(xp.abs(ahead) - farthest(xp, hip), 0.0, None).sum(-1)
+    too_far = xp.clip(xp.abs(ahead) - farthest(xp, long), 0.0, None).sum(-1)
     touches = _price(xp, FOOT_RADIUS + EDGE - view.clearance(foot), 0) + _price(xp, short, 1)
     return touches + _OUT_OF_REACH * too_far
 

@@ -31,9 +31,9 @@ SENSED_TABLE = ObservationTable(PROPRIOCEPTION.terms[1:])
 assert PROPRIOCEPTION.terms[0].name == "base_linear_velocity"
 
 
-def observe_gait(xp: Any, config: GaitConfig, gait: GaitState, feet: Any) -> Any:
+def observe_gait(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, latency: Any) -> Any:
     """(n, 63) the rows of the gait as a policy observes them, scaled; arguments as for ``path.gait_rows``."""
-    rows = gait_rows(xp, config, gait, feet)
+    rows = gait_rows(xp, config, gait, feet, latency)
     return xp.clip(rows * constant(xp, _SCALE, rows), -CLIP, CLIP)
 
 

@@ -71,21 +71,25 @@ class Distillation:
 
         t, n = config.steps, num_envs
         self._inputs = torch.zeros(t, n, student.vector_size, device=device)
-        self._velocity = torch.zeros(t, n, 3, device=device)
+        self._velocity = torch.zeros(t, n, 4, device=device)
         self._fresh = torch.zeros(t, n, dtype=torch.bool, device=device)
         self._state = student.initial_state(n, device)
         self._starts = [tuple(torch.zeros_like(x) for x in self._network_state()) for _ in range(t // config.bptt)]
         self._vector = torch.zeros(n, SENSED_TABLE.size, device=device)
         self._depth = torch.zeros(n, *(student.image or (0, 0)), dtype=torch.float16, device=device)
         self._age = torch.zeros(n, device=device)
-        self._truth = Prediction(torch.zeros(n, 3, device=device), torch.zeros(n, len(POINTS), device=device))
+        self._truth = Prediction(
+            torch.zeros(n, 3, device=device),
+            torch.zeros(n, 1, device=device),
+            torch.zeros(n, len(POINTS), device=device),
+        )
         self._told = torch.zeros(n, 1, dtype=torch.bool, device=device)
         self._action = torch.zeros(n, student.action_size, device=device)
         self._begun = torch.ones(n, dtype=torch.bool, device=device)
         self._order, self._steps = torch.arange(n, device=device)[:, None] / n, torch.arange(t, device=device)
         self._mapping = torch.zeros(2, device=device)  # squared errors of the maps, and squares of the heights
         self._step = 0
-        self._parts, self._totals = min(config.minibatches, n), torch.zeros(2, device=device)
+        self._parts, self._totals = min(config.minibatches, n), torch.zeros(3, device=device)
         self._graph = StepGraph(self._walk) if on_gpu else None
         # a graph wants minibatches that are all as large
         self._descent = StepGraph(self._descend) if on_gpu and n % self._parts == 0 else None
@@ -108,6 +112,7 @@ class Distillation:
                 (self._age, "age"),
                 (self._truth.velocity, "velocity"),
                 (self._truth.heights, "heights"),
+                (self._truth.latency, "latency"),
             ):
                 kept.copy_(obs[name])
             self._told.copy_(self._order < self.teacher_fraction)
@@ -127,13 +132,15 @@ class Distillation:
         stance = student.stance(vector)
         memory = student.begin(stance, student.unpack(self._state), self._begun)
         inputs = student.network_input(vector, stance, memory)
-        for kept, now in ((self._inputs, inputs), (self._velocity, truth.velocity), (self._fresh, self._begun)):
+        label = torch.cat([truth.velocity, truth.latency], 1)
+        for kept, now in ((self._inputs, inputs), (self._velocity, label), (self._fresh, self._begun)):
             kept.index_copy_(0, step, now[None])
         said, network = student.estimate(inputs[None], memory.network, self._begun[None])
-        velocity = torch.where(told, truth.velocity, said[0])
+        velocity = torch.where(told, truth.velocity, said[0, :, :3])
+        latency = torch.where(told, truth.latency, said[0, :, 3:])
         heights, map_ = student.survey(self._depth, stance, velocity, memory, self._age)
         self._mapping += torch.stack([((heights - truth.heights) ** 2).sum(), (truth.heights**2).sum()])
-        believed = Prediction(velocity, torch.where(told, truth.heights, heights))
+        believed = Prediction(velocity, latency, torch.where(told, truth.heights, heights))
         action, gait = student.walk(vector, stance, believed, memory)
         self._action.copy_(action)
         for kept, now in zip(self._state, student.pack(Memory(network, gait, velocity, map_)), strict=True):
@@ -168,11 +175,12 @@ class Distillation:
                     self._descend(robots)
                 else:
                     self._descent.run(robots)
-        velocity, norm = (self._totals / (epochs * self._parts)).tolist()
+        velocity, latency, norm = (self._totals / (epochs * self._parts)).tolist()
         missed, raised = self._mapping.tolist()
         self._mapping.zero_()
         return {
             "velocity_rmse": velocity**0.5,
+            "latency_rmse": latency**0.5,
             "map_error": missed / max(raised, 1e-9),
             "gradient_norm": norm,
             "teacher_share": self.teacher_fraction,
@@ -180,14 +188,14 @@ class Distillation:
 
     def _descend(self, robots: Tensor) -> None:
         """One step of the optimiser on some robots' windows."""
-        loss = self.loss(robots)
+        loss, latency = self.loss(robots)
         self.optimizer.zero_grad(set_to_none=True)
-        (loss / VELOCITY_UNIT**2).backward()
+        (loss / VELOCITY_UNIT**2 + 0.1 * latency / 0.01**2).backward()
         norm = nn.utils.clip_grad_norm_(self._learned, self.config.max_grad_norm)
         self.optimizer.step()
-        self._totals += torch.stack([loss, norm]).detach()
+        self._totals += torch.stack([loss, latency, norm]).detach()
 
-    def loss(self, robots: Tensor) -> Tensor:
+    def loss(self, robots: Tensor) -> tuple[Tensor, Tensor]:
         """Mean squared error of each component of the velocity in some robots' windows [(m/s)^2]."""
         windows = self.config.steps // self.config.bptt
 
@@ -198,7 +206,8 @@ class Distillation:
 
         state = tuple(torch.cat([start[:, robots] for start in part], 1) for part in zip(*self._starts, strict=True))
         said, _ = self.student.estimate(cut(self._inputs), state, cut(self._fresh))
-        return functional.mse_loss(said, cut(self._velocity))
+        true = cut(self._velocity)
+        return functional.mse_loss(said[..., :3], true[..., :3]), functional.mse_loss(said[..., 3], true[..., 3])
 
     # ---- what the loop needs --------------------------------------------------------------------------------------
 

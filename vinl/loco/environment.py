@@ -60,6 +60,7 @@ class Observations(NamedTuple):
     privileged: Float[Array, "n privileged"]
     heights: Float[Array, "n points"]
     velocity: Float[Array, "n 3"]
+    latency: Float[Array, "n 1"]
     pose: Float[Array, "n 7"]
 
 
@@ -189,7 +190,9 @@ class LocoEnvironment:
         body, traits, c = state.body, state.traits, self.config.randomisation
         heights = scan_ground(jnp, ground.heights, self.simulation.frame, body.qpos)
         plain = observe(jnp, body.qpos, body.qvel, state.command, state.action, heights)
-        rows = observe_gait(jnp, self.config.gait, state.gait, feet_in_heading_frame(jnp, body.qpos))
+        latency = settings.noise * traits.latency
+        feet = feet_in_heading_frame(jnp, body.qpos)
+        rows = observe_gait(jnp, self.config.gait, state.gait, feet, latency)
         exact = insert_gait(jnp, plain, rows)
         noise = 2 * jax.random.uniform(jax.random.fold_in(state.key, 1), exact.shape) - 1
         errors = {
@@ -226,7 +229,7 @@ class LocoEnvironment:
         if self.config.stage == 3:
             floor = local_heights(ground, self.simulation.frame, body)
         velocity = exact[:, _VELOCITY] / STEPPING_MAP_TABLE.scale[_VELOCITY]
-        return Observations(noisy, exact, privileged, floor, velocity, body.qpos[:, :7] + 0.0)
+        return Observations(noisy, exact, privileged, floor, velocity, latency[:, None], body.qpos[:, :7] + 0.0)
 
     def _advance(
         self, ground: DeviceGround, old: EnvState, lost: Lost, given: Float[Array, "n 12"], settings: Settings

@@ -178,7 +178,7 @@ class CameraVecEnv(LocoVecEnv):
 
     def _pack(self, seen: dict[str, torch.Tensor], done: torch.Tensor | None) -> TensorDict:
         observation = super()._pack(seen, done)
-        for name in ("heights", "velocity"):
+        for name in ("heights", "velocity", "latency"):
             observation[name] = seen[name]
         with self._stopwatch.part("render"):
             observation["depth"], observation["age"] = self.cameras.look(seen["pose"], done), self.cameras.age

@@ -20,7 +20,7 @@ from vinl.gait.config import GaitConfig
 from vinl.gait.footholds import plan_footholds
 from vinl.gait.local_map import POINTS, LocalMapView, floor_under
 from vinl.gait.observation import GAIT_ROWS, SENSED_TABLE, STEPPING_TABLE
-from vinl.gait.path import GAIT_SIZE, gait_rows
+from vinl.gait.path import GAIT_SIZE, LATENCIES, MEAN_LATENCY, gait_rows
 from vinl.gait.proprioception import feet_in_trunk, heading_axes, into_heading_frame, motion_of
 from vinl.gait.state import GaitState, aim, start_gait, tick
 from vinl.policies.depth_memory import DepthMemory, State
@@ -61,6 +61,7 @@ class Prediction(NamedTuple):
     """
 
     velocity: Tensor
+    latency: Tensor
     heights: Tensor
 
 
@@ -113,7 +114,7 @@ class SteppingActor(PolicyNetwork):
         self.image = None if eye is None else (eye.height, eye.width)
         self.elevation = None if eye is None else ElevationMap(eye)
         self.dates_images = eye is not None and self.remembers
-        self.velocity = nn.Linear(hidden, 3)
+        self.velocity = nn.Linear(hidden, 4)
         self.actor = step_layers(actor, actions)
         nn.init.normal_(self.velocity.weight, std=0.01)  # it begins with the belief that it stands
         nn.init.zeros_(self.velocity.bias)
@@ -186,7 +187,8 @@ class SteppingActor(PolicyNetwork):
     ) -> tuple[Float[Tensor, "t n 3"], State]:
         """Velocities of the trunk in t steps in a row from ``network_input`` [m/s], and the memory network's state."""
         features, state = self.memory(None, inputs, state, fresh)
-        return self.velocity(features), state
+        said = self.velocity(features)
+        return torch.cat([said[..., :3], 0.05 * said[..., 3:] + MEAN_LATENCY], -1), state
 
     def survey(
         self,
@@ -234,7 +236,7 @@ class SteppingActor(PolicyNetwork):
         gait = tick(torch, self.gait, memory.gait, motion, command, feet)
         plan = plan_footholds(torch, self.gait, view, gait, level, command, feet)
         gait = aim(torch, self.gait, gait, plan, level, command, feet)
-        rows = gait_rows(torch, self.gait, gait, feet) * self.rows_scale
+        rows = gait_rows(torch, self.gait, gait, feet, said.latency[:, 0].clamp(*LATENCIES)) * self.rows_scale
         scale = STEPPING_TABLE.terms[0].scale[0]
         observed = torch.cat([said.velocity * scale, vector, rows], 1)
         return self.actor(observed), gait
@@ -265,10 +267,12 @@ class SteppingActor(PolicyNetwork):
             inputs = self.network_input(vector[k], stance, memory)[None]
             velocity, network = self.estimate(inputs, memory.network, fresh[k : k + 1])
             image, old = None if depth is None else depth[k], None if age is None else age[k]
-            heights, map_ = self.survey(image, stance, velocity[0], memory, old)
-            action, gait = self.walk(vector[k], stance, Prediction(velocity[0], heights), memory, adapt=True)
+            heights, map_ = self.survey(image, stance, velocity[0, :, :3], memory, old)
+            action, gait = self.walk(
+                vector[k], stance, Prediction(velocity[0, :, :3], velocity[0, :, 3:], heights), memory, adapt=True
+            )
             actions.append(action)
-            state = self.pack(Memory(network, gait, velocity[0], map_))
+            state = self.pack(Memory(network, gait, velocity[0, :, :3], map_))
         return torch.stack(actions), state
 
 
