@@ -43,7 +43,7 @@ LOOK_AHEAD = 0.085
 """Legs follow their targets so much later than the latency [s]: damping over stiffness, 0.05 s, the delay, and what it
 takes to gain speed. A policy that sees only the next step is late."""
 
-MEAN_LATENCY = 0.02
+MEAN_LATENCY = 0.015
 """Of the training [s]."""
 
 LATENCIES = 0.0, 0.04
