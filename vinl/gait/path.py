@@ -32,8 +32,8 @@ GAIT_TERMS: tuple[tuple[str, int, float, str], ...] = (
 )
 """Name, size, scale and unit of what ``gait_rows`` gives, in its order: from each foot to the next point of its path
 (x, y, z), to where the path is ``LOOK_AHEAD`` later, to its foothold (x, y) and to the height of its apex, all in the
-heading frame; its phase; whether it swings, now and ``LOOK_AHEAD`` later, and whether it
-bears weight ``LOAD_AHEAD`` later; how much faster its clock runs while it
+heading frame; its phase; whether it swings, now and ``LOOK_AHEAD`` later, and whether it bears weight
+``UNLOAD_AHEAD`` later if it stands, ``LOAD_AHEAD`` if it swings; how much faster its clock runs while it
 stands; how far the hips should rise above their usual height; and how far the trunk is behind its commands."""
 
 _DELAY = CONTROL_DT / 2
@@ -49,9 +49,9 @@ MEAN_LATENCY = 0.015
 LATENCIES = 0.0, 0.04
 """Least and largest latency of an action that is told of [s]."""
 
-LOAD_AHEAD = _DELAY + 0.01
-"""Torques act sooner than motions [s]: after the delay; and a foot that comes down needs
-some of its weight at once. A leg that is given its weight 75 ms early slaps down 4 cm short of its foothold."""
+UNLOAD_AHEAD, LOAD_AHEAD = _DELAY + 0.03, _DELAY - 0.01
+"""Torques act sooner than motions [s]: after the delay. Feet lift off late, and come down early, by 20 ms if these are
+the same."""
 
 GAIT_SIZE = sum(size for _, size, _, _ in GAIT_TERMS)
 
@@ -109,7 +109,8 @@ def gait_rows(xp: Any, config: GaitConfig, gait: GaitState, feet: Any, latency: 
     error = swing_path(xp, config, gait, feet, CONTROL_DT) - feet
     apex = xp.where(swinging, gait.apex - feet[..., 2], 0 * feet[..., 2])
     angle, none = 2 * math.pi * phases, 0 * apex
-    swings_then, unloaded = (_swings(xp, config, gait, later) for later in (LOOK_AHEAD + late, LOAD_AHEAD + late))
+    load_ahead = xp.where(swinging, none + LOAD_AHEAD, none + UNLOAD_AHEAD)
+    swings_then, unloaded = (_swings(xp, config, gait, later + late) for later in (LOOK_AHEAD, load_ahead))
     parts = [
         xp.clip(error, -0.5, 0.5).reshape(n, 12),
         xp.clip(swing_path(xp, config, gait, feet, LOOK_AHEAD + late) - feet, -0.5, 0.5).reshape(n, 12),
