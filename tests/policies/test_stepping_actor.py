@@ -155,3 +155,23 @@ def test_a_card_rebuilds_it_with_its_gait() -> None:
     assert again.gait == network.gait and again.observation_size == SENSED_TABLE.size
     assert again.elevation is not None and again.elevation.rays.device.type == "cpu"
     assert STEPPING_TABLE.size == SENSED_TABLE.size + 3 + sum(row.size for row in GAIT_ROWS)
+
+
+def test_feet_that_stand_and_agree_correct_the_velocity() -> None:
+    network = blind()
+    vector = sensed(poses(np.random.default_rng(7), 0.0), np.zeros((N, 3)), np.zeros((N, 3)))
+    stance = network.stance(vector)
+    memory = network.begin(stance, network.unpack(network.initial_state(N)), torch.ones(N, dtype=torch.bool))
+    assert stance.by_feet.abs().max() < 1e-4  # nothing moves
+
+    def believe(forward: float) -> torch.Tensor:
+        said = torch.tensor([[forward, 0.0, 0.2]]).expand(N, 3)
+        return network.believe(said, stance, memory)
+
+    near, far = believe(0.05), believe(1.0)
+    assert (near[:, 0].abs() < 0.02).all()
+    torch.testing.assert_close(far[:, :2], torch.tensor([[1.0, 0.0]]).expand(N, 2))  # all feet slip
+    torch.testing.assert_close(near[:, 2], torch.full((N,), 0.2))
+    phases = torch.full_like(memory.gait.phases, 0.1)  # all feet in the air
+    swinging = memory._replace(gait=memory.gait._replace(phases=phases))
+    torch.testing.assert_close(network.believe(far, stance, swinging), far)

@@ -12,6 +12,11 @@ import numpy as np
 from vinl.gait.arrays import constant
 from vinl.robot.aliengo import CONTROL_DT, HIPS, LINK, THIGH_ASIDE
 
+ROLLING_RADIUS = 0.0225
+"""How far above the point that it rolls about the middle of a foot moves [m]: its radius, less what it is pressed in
+[what takes out the bias of standing feet in MuJoCo C]. Shanks swing through a stance, and feet roll with them: 6 % of
+the trunk's speed."""
+
 
 def feet_in_trunk(xp: Any, joints: Any) -> Any:
     """(n, 4, 3) middles of the feet in the trunk's frame [m], from joint angles (n, 12) [rad]."""
@@ -22,6 +27,25 @@ def feet_in_trunk(xp: Any, joints: Any) -> Any:
     c, s = xp.cos(hip), xp.sin(hip)
     at_hips = constant(xp, HIPS.astype(np.float32), joints)
     return xp.stack([ahead, c * aside - s * below, s * aside + c * below], -1) + at_hips
+
+
+def velocities_by_feet(xp: Any, joints: Any, speeds: Any, gravity: Any, turning: Any) -> Any:
+    """(n, 4, 3) how fast the trunk moves in its own frame, if each foot rolls on the ground and does not slip [m/s].
+
+    Args:
+        xp: ``numpy``, ``jax.numpy`` or ``torch``.
+        joints: (n, 12) angles [rad].
+        speeds: (n, 12) of the joints [rad/s].
+        gravity: (n, 3) its direction in the trunk's frame.
+        turning: (n, 3) angular velocity of the trunk, in its frame [rad/s].
+    """
+    feet = feet_in_trunk(xp, joints)
+    moved = (feet_in_trunk(xp, joints - CONTROL_DT * speeds) - feet) / CONTROL_DT
+    turned, up = (xp.broadcast_to(x[:, None], feet.shape) for x in (turning, -gravity))
+    hip, bend = speeds[:, 0::3], speeds[:, 1::3] + speeds[:, 2::3]
+    c, s = xp.cos(joints[:, 0::3]), xp.sin(joints[:, 0::3])
+    shank = turned + xp.stack([hip, c * bend, s * bend], -1)
+    return moved - xp.linalg.cross(turned, feet) + xp.linalg.cross(shank, ROLLING_RADIUS * up)
 
 
 def heading_axes(xp: Any, gravity: Any) -> Any:

@@ -83,7 +83,8 @@ class Distillation:
         self._action = torch.zeros(n, student.action_size, device=device)
         self._begun = torch.ones(n, dtype=torch.bool, device=device)
         self._order, self._steps = torch.arange(n, device=device)[:, None] / n, torch.arange(t, device=device)
-        self._mapping = torch.zeros(2, device=device)  # squared errors of the maps, and squares of the heights
+        # squared errors of the maps, squares of the heights, squared errors of the velocity that robots walk by
+        self._beliefs = torch.zeros(3, device=device)
         self._step = 0
         self._parts, self._totals = min(config.minibatches, n), torch.zeros(2, device=device)
         self._graph = StepGraph(self._walk) if on_gpu else None
@@ -130,9 +131,11 @@ class Distillation:
         for kept, now in ((self._inputs, inputs), (self._velocity, truth.velocity), (self._fresh, self._begun)):
             kept.index_copy_(0, step, now[None])
         said, network = student.estimate(inputs[None], memory.network, self._begun[None])
-        velocity = torch.where(told, truth.velocity, said[0])
+        velocity = torch.where(told, truth.velocity, student.believe(said[0], stance, memory))
         heights, map_ = student.survey(self._depth, stance, velocity, memory, self._age)
-        self._mapping += torch.stack([((heights - truth.heights) ** 2).sum(), (truth.heights**2).sum()])
+        wrong = ((a - b) ** 2 for a, b in ((heights, truth.heights), (velocity, truth.velocity)))
+        missed, erred = (x.sum() for x in wrong)
+        self._beliefs += torch.stack([missed, (truth.heights**2).sum(), erred])
         believed = Prediction(velocity, torch.where(told, truth.heights, heights))
         action, gait = student.walk(vector, stance, believed, memory)
         self._action.copy_(action)
@@ -169,10 +172,11 @@ class Distillation:
                 else:
                     self._descent.run(robots)
         velocity, norm = (self._totals / (epochs * self._parts)).tolist()
-        missed, raised = self._mapping.tolist()
-        self._mapping.zero_()
+        missed, raised, erred = self._beliefs.tolist()
+        self._beliefs.zero_()
         return {
             "velocity_rmse": velocity**0.5,
+            "believed_rmse": (erred / self._velocity.numel()) ** 0.5,
             "map_error": missed / max(raised, 1e-9),
             "gradient_norm": norm,
             "teacher_share": self.teacher_fraction,

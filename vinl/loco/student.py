@@ -38,7 +38,7 @@ def describe_student_figures(row: dict[str, float]) -> dict[str, str]:
     return {
         "samples/s": f"{row['samples_per_second']:,.0f}",
         "map": f"{row['loss/map_error']:.0%} off",
-        "velocity": f"{row['loss/velocity_rmse']:.3f} m/s",
+        "velocity": f"{row['loss/believed_rmse']:.3f} m/s",
         "feet/m": f"{row['foot_block_per_m']:.2f}",
         "falls/min": f"{row['falls_per_minute']:.2f}",
     }

@@ -1,8 +1,9 @@
 """A locomotion policy that plans its footholds from depth: velocity estimator, elevation map, planner and actor.
 
-A memory network predicts the velocity of the trunk, which no robot measures, from what legs and IMU tell. Dead
-reckoning by it keeps an elevation map of what the camera saw; gait and footholds follow from that by the planner of
-``vinl.gait``, and the teacher's actor moves the joints. What it believes is in metres and can be drawn.
+A memory network predicts the velocity of the trunk, which no robot measures, from what legs and IMU tell, and feet that
+hold the ground correct it. Dead reckoning keeps an elevation map of what the camera saw; gait and footholds follow from
+that by the planner of ``vinl.gait``, and the teacher's actor moves the joints. What it believes is in metres and can be
+drawn.
 """
 
 from __future__ import annotations
@@ -21,19 +22,24 @@ from vinl.gait.footholds import plan_footholds
 from vinl.gait.local_map import POINTS, LocalMapView, floor_under
 from vinl.gait.observation import GAIT_ROWS, SENSED_TABLE, STEPPING_TABLE
 from vinl.gait.path import GAIT_SIZE, gait_rows
-from vinl.gait.proprioception import feet_in_trunk, heading_axes, into_heading_frame, motion_of
-from vinl.gait.state import GaitState, aim, start_gait, tick
+from vinl.gait.proprioception import feet_in_trunk, heading_axes, into_heading_frame, motion_of, velocities_by_feet
+from vinl.gait.state import GaitState, aim, start_gait, swings, tick
 from vinl.policies.depth_memory import DepthMemory, State
 from vinl.policies.elevation_map import ElevationMap, MapState
 from vinl.policies.networks import PolicyNetwork, step_layers
-from vinl.robot.aliengo import CONTROL_DT, DEFAULT_POSE
+from vinl.robot.aliengo import DEFAULT_POSE
 from vinl.robot.cameras import Camera
 
 _GAIT_NUMBERS = (4, 1, 4, 12, 12, 4, 1, 2)
 """Sizes of the fields of ``GaitState``."""
 
-
 _COMMAND = SENSED_TABLE.place("command")
+
+_SLIP = 0.1
+"""A foot that tells another velocity than the network, by so much [m/s], slips, or has not come down yet."""
+
+_TRUST, _DOUBT = 0.7, 0.05
+"""How far the velocity is drawn to what feet tell; half as far where all of them together have this weight."""
 
 
 class Stance(NamedTuple):
@@ -42,14 +48,14 @@ class Stance(NamedTuple):
     Attributes:
         felt: the numbers of ``SENSED_TABLE`` in SI units, by its names; joint positions as angles.
         axes: (n, 3, 3) of the heading frame in the trunk's.
-        in_trunk: (n, 4, 3) the feet in the frame of the trunk [m].
         feet: (n, 4, 3) the feet in the heading frame [m].
+        by_feet: (n, 4, 3) velocity of the trunk by each foot, if that rolls on the ground [m/s].
     """
 
     felt: dict[str, Tensor]
     axes: Tensor
-    in_trunk: Tensor
     feet: Tensor
+    by_feet: Tensor
 
 
 class Prediction(NamedTuple):
@@ -169,17 +175,16 @@ class SteppingActor(PolicyNetwork):
             felt[term.name] = plain[:, first : first + term.size]
             first += term.size
         felt["joint_position"] = felt["joint_position"] + self.default_pose
-        axes, feet = heading_axes(torch, felt["projected_gravity"]), feet_in_trunk(torch, felt["joint_position"])
-        return Stance(felt, axes, feet, into_heading_frame(axes, feet))
+        joints, gravity = felt["joint_position"], felt["projected_gravity"]
+        axes, feet = heading_axes(torch, gravity), feet_in_trunk(torch, joints)
+        by_feet = velocities_by_feet(torch, joints, felt["joint_velocity"], gravity, felt["base_angular_velocity"])
+        return Stance(felt, axes, into_heading_frame(axes, feet), by_feet)
 
     def network_input(self, vector: Float[Tensor, "n 45"], stance: Stance, memory: Memory) -> Float[Tensor, "n 68"]:
         """What the estimator of the velocity is given: the robot's senses, the legs' phases, the velocity that it last
-        said, and how fast the trunk would move if each foot stood still [m/s]."""
-        angle, felt, feet = 2 * torch.pi * memory.gait.phases, stance.felt, stance.in_trunk
-        before = feet_in_trunk(torch, felt["joint_position"] - CONTROL_DT * felt["joint_velocity"])
-        turning = felt["base_angular_velocity"][:, None].expand_as(feet)
-        odometry = (before - feet) / CONTROL_DT - torch.linalg.cross(turning, feet)
-        return torch.cat([vector, torch.sin(angle), torch.cos(angle), memory.velocity, odometry.flatten(1)], 1)
+        believed, and how fast the trunk would move if each foot rolled on the ground [m/s]."""
+        angle = 2 * torch.pi * memory.gait.phases
+        return torch.cat([vector, torch.sin(angle), torch.cos(angle), memory.velocity, stance.by_feet.flatten(1)], 1)
 
     def estimate(
         self, inputs: Float[Tensor, "t n 68"], state: State, fresh: Bool[Tensor, "t n"]
@@ -187,6 +192,19 @@ class SteppingActor(PolicyNetwork):
         """Velocities of the trunk in t steps in a row from ``network_input`` [m/s], and the memory network's state."""
         features, state = self.memory(None, inputs, state, fresh)
         return self.velocity(features), state
+
+    def believe(self, said: Float[Tensor, "n 3"], stance: Stance, memory: Memory) -> Float[Tensor, "n 3"]:
+        """The velocity of the trunk [m/s]: what the network says, drawn to what feet tell that stand and agree with it.
+
+        A network that was trained with noise smooths over time, and errs in the same direction for a second, in which
+        everything on the map moves by as much. Feet that hold the ground do not."""
+        told = stance.by_feet
+        apart = ((told - said[:, None])[..., :2] ** 2).sum(-1)
+        weight = torch.where(swings(torch, self.gait, memory.gait), 0.0, torch.exp(-apart / _SLIP**2))[..., None]
+        total = weight.sum(1)
+        by_feet = (told * weight).sum(1) / total.clamp(min=1e-6)
+        level = torch.lerp(said, by_feet, _TRUST * total / (total + _DOUBT))
+        return torch.cat([level[:, :2], said[:, 2:]], 1)
 
     def survey(
         self,
@@ -199,7 +217,7 @@ class SteppingActor(PolicyNetwork):
         """Heights about the robot, and the map after this step's image, which is ``age`` [s] old."""
         if self.elevation is None or then.map is None or image is None:
             return torch.zeros(len(velocity), len(POINTS), device=velocity.device), None
-        felt, axes, _, feet = stance
+        felt, axes, feet, _ = stance
         now = self.elevation.move(then.map, motion_of(torch, axes, velocity, felt["base_angular_velocity"]))
         now = self.elevation.see(now, image, axes, floor_under(torch, feet), age)
         return self.elevation.read(now), now
@@ -223,7 +241,7 @@ class SteppingActor(PolicyNetwork):
     ) -> tuple[Float[Tensor, "n 12"], GaitState]:
         """Actions of what is believed, or known to be right, and the gait after them; ``adapt``: by the command of
         ``adapt_command``. Trainings walk as they are told."""
-        felt, axes, _, feet = stance
+        felt, axes, feet, _ = stance
         view, command = LocalMapView(torch, said.heights, floor_under(torch, feet)), felt["command"]
         if adapt:
             command = adapt_command(torch, self.gait, view, command, feet)
@@ -263,12 +281,13 @@ class SteppingActor(PolicyNetwork):
             stance = self.stance(vector[k])
             memory = self.begin(stance, self.unpack(state), fresh[k])
             inputs = self.network_input(vector[k], stance, memory)[None]
-            velocity, network = self.estimate(inputs, memory.network, fresh[k : k + 1])
+            said, network = self.estimate(inputs, memory.network, fresh[k : k + 1])
             image, old = None if depth is None else depth[k], None if age is None else age[k]
-            heights, map_ = self.survey(image, stance, velocity[0], memory, old)
-            action, gait = self.walk(vector[k], stance, Prediction(velocity[0], heights), memory, adapt=True)
+            velocity = self.believe(said[0], stance, memory)
+            heights, map_ = self.survey(image, stance, velocity, memory, old)
+            action, gait = self.walk(vector[k], stance, Prediction(velocity, heights), memory, adapt=True)
             actions.append(action)
-            state = self.pack(Memory(network, gait, velocity[0], map_))
+            state = self.pack(Memory(network, gait, velocity, map_))
         return torch.stack(actions), state
 
 
