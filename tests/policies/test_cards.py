@@ -8,7 +8,11 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 CARDS = {path.parent.name: json.loads(path.read_text()) for path in sorted(ROOT.glob("assets/policies/*/card.json"))}
-ROWS: dict[str, dict[str, Any]] = json.loads((ROOT / "docs" / "results" / "table.json").read_text())["rows"]
+ROWS: dict[str, dict[str, Any]] = {
+    name: row
+    for path in (ROOT / "docs" / "results").glob("*.json")
+    for name, row in json.loads(path.read_text())["rows"].items()
+}
 DIGESTS = {
     policy["name"]: policy["weights_sha256"]
     for row in ROWS.values()
