@@ -46,3 +46,12 @@ def test_a_wall_is_kept_off_and_no_ground_to_step_over() -> None:
     np.testing.assert_allclose(view.clearance(foot), [[0.025, -0.075]], atol=1e-6)
     high = LocalMapView(np, np.minimum(heights, 0.2), np.full(1, -0.4))
     np.testing.assert_allclose(high.crest(beside), -0.2)  # a block is stepped over
+
+
+def test_a_point_that_is_none_reads_something_and_stops_nothing() -> None:
+    rows = np.random.default_rng(1).uniform(0.0, 0.2, (2, len(POINTS))).astype(np.float32)
+    view = LocalMapView(torch, torch.from_numpy(rows), torch.zeros(2))
+    points = torch.full((2, 3, 3), torch.nan)
+    points[:, 0] = torch.tensor([0.3, 0.1, 0.0])
+    assert torch.isfinite(view.clearance(points)[:, 0]).all()
+    assert view.height(points[..., :2]).shape == (2, 3)

@@ -30,7 +30,8 @@ def to_index(xp: Any, values: Any) -> Any:
 
 
 def take_along(xp: Any, array: Any, index: Any, axis: int) -> Any:
-    """``take_along_axis`` of numpy for all three array modules."""
-    if hasattr(xp, "from_numpy"):
-        return xp.take_along_dim(array, index, axis)
+    """``take_along_axis`` of numpy for all three array modules; what is no place (NaN) takes an end."""
+    if hasattr(xp, "from_numpy"):  # its own take_along_dim divides every index, which takes longer than all the rest
+        whole = [*array.shape[:axis], index.shape[axis], *array.shape[axis + 1 :]]
+        return xp.gather(array, axis, index.clamp(0, array.shape[axis] - 1).expand(whole))
     return xp.take_along_axis(array, index, axis)

@@ -5,6 +5,7 @@ For numpy, jax.numpy and torch (``xp``). The planner reads it as it reads the wo
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,10 @@ class LocalMapView:
         reach = round(CREST_RADIUS / CELL)
         disc = [(i, j) for i in range(-reach, reach + 1) for j in range(-reach, reach + 1) if np.hypot(i, j) <= reach]
         self._crest = self._highest(ground, disc).reshape(len(heights), -1)
-        self._distance, self._top = (x.reshape(len(heights), -1) for x in self._obstacles(grid))
+        distance, self._top = (x.reshape(len(heights), -1) for x in self._obstacles(grid))
+        # of a cell and those beyond it, beside one another: what lies between them is read at once
+        beyond, last = (0, 1, SHAPE[1], SHAPE[1] + 1), distance.shape[1] - SHAPE[1] - 1
+        self._corners = xp.stack([distance[:, k : k + last] for k in beyond], -1)
 
     def clearance(self, points: Any) -> Any:
         """See ``GroundView``."""
@@ -73,13 +77,10 @@ class LocalMapView:
         i0, j0 = xp.floor(i), xp.floor(j)
         i0, j0 = xp.clip(i0, 0, SHAPE[0] - 2), xp.clip(j0, 0, SHAPE[1] - 2)
         a, b = i - i0, j - j0
-        corner = i0 * SHAPE[1] + j0
-
-        def read(step: int) -> Any:
-            return self._read(self._distance, corner + step)
-
-        beside = (1 - a) * ((1 - b) * read(0) + b * read(1))
-        beside = beside + a * ((1 - b) * read(SHAPE[1]) + b * read(SHAPE[1] + 1))
+        index = to_index(xp, i0 * SHAPE[1] + j0).reshape(len(points), -1, 1)
+        corners = take_along(xp, self._corners, index, 1).reshape(*i.shape, 4)
+        beside = (1 - a) * ((1 - b) * corners[..., 0] + b * corners[..., 1])
+        beside = beside + a * ((1 - b) * corners[..., 2] + b * corners[..., 3])
         top = self._read(self._top, xp.round(i) * SHAPE[1] + xp.round(j))
         above = points[..., 2] - self._over(points) - top
         outside = xp.hypot(xp.clip(beside, 0, None), xp.clip(above, 0, None))
@@ -110,21 +111,21 @@ class LocalMapView:
         flat = to_index(self._xp, index).reshape(len(grid), -1)
         return take_along(self._xp, grid, flat, 1).reshape(index.shape)
 
-    def _shifted(self, grid: Any, i: int, j: int, outside: float) -> Any:
-        """The grid seen from cells (i, j) farther back."""
-        xp, (rows, columns) = self._xp, SHAPE
-        if i:
-            edge = grid[:, : abs(i)] * 0 + outside
-            grid = xp.concatenate([grid[:, i:], edge] if i > 0 else [edge, grid[:, : rows + i]], 1)
-        if j:
-            edge = grid[:, :, : abs(j)] * 0 + outside
-            grid = xp.concatenate([grid[:, :, j:], edge] if j > 0 else [edge, grid[:, :, : columns + j]], 2)
-        return grid
+    def _shifted(self, grid: Any, offsets: list[tuple[int, int]], outside: float) -> Iterator[Any]:
+        """The grid seen from so many cells (i, j) farther back, for each of the offsets."""
+        wide = grid
+        far = [max(abs(offset[axis]) for offset in offsets) for axis in (0, 1)]
+        for axis, reach in enumerate(far, 1):
+            if reach:
+                edge = 0 * (wide[:, :reach] if axis == 1 else wide[:, :, :reach]) + outside
+                wide = self._xp.concatenate([edge, wide, edge], axis)
+        for i, j in offsets:
+            yield wide[:, far[0] + i :][:, : SHAPE[0], far[1] + j : far[1] + j + SHAPE[1]]
 
     def _highest(self, grid: Any, offsets: list[tuple[int, int]]) -> Any:
         best = grid
-        for i, j in offsets:
-            best = self._xp.maximum(best, self._shifted(grid, i, j, -1.0))
+        for shifted in self._shifted(grid, offsets, -1.0):
+            best = self._xp.maximum(best, shifted)
         return best
 
     def _obstacles(self, grid: Any) -> tuple[Any, Any]:
@@ -135,11 +136,10 @@ class LocalMapView:
         # from the nearest obstacle and to the nearest floor, in one go
         square = xp.concatenate([xp.where(solid, nothing, far), xp.where(solid, far, nothing)], 0)
         for axis in (0, 1):  # exact squared distances to cells, one axis after the other
-            best = square
-            for k in range(1, reach + 1):
-                for step in (-k, k):
-                    moved = self._shifted(square, *((step, 0) if axis == 0 else (0, step)), 9.0)
-                    best = xp.minimum(best, moved + (k * CELL) ** 2)
+            best, steps = square, [step for step in range(-reach, reach + 1) if step]
+            offsets = [(step, 0) if axis == 0 else (0, step) for step in steps]
+            for step, moved in zip(steps, self._shifted(square, offsets, 9.0), strict=True):
+                best = xp.minimum(best, moved + (step * CELL) ** 2)
             square = best
         outside, inside = xp.sqrt(square[: len(grid)]), xp.sqrt(square[len(grid) :])
         distance = xp.clip(outside - inside - xp.where(solid, nothing - CELL / 2, nothing + CELL / 2), -_FAR, _FAR)

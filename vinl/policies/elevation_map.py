@@ -16,7 +16,6 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from vinl.gait.local_map import POINTS, WALL
-from vinl.gait.proprioception import into_heading_frame
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import Camera
 
@@ -119,8 +118,8 @@ class ElevationMap(nn.Module):
             motion: of the trunk in it, as ``vinl.gait.proprioception.motion_of`` gives it [m, rad].
         """
         before = self._cell_of(state.pose[:, :2])
-        half = state.pose[:, 2] + 0.5 * motion[:, 3]
-        way = _turned(half, motion[:, None, :2])[:, 0]
+        half = state.pose[:, 2:] + 0.5 * motion[:, 3:]
+        way = torch.cat(_turned(half, motion[:, :1], motion[:, 1:2]), 1)
         pose = torch.cat([state.pose[:, :2] + way, state.pose[:, 2:] + motion[:, 3:]], 1)
         after = self._cell_of(pose[:, :2])
         stale = _place(before) != _place(after)  # (n, 2, SIDE): columns and rows that stand for other ground now
@@ -150,21 +149,25 @@ class ElevationMap(nn.Module):
         then = now if age is None else _stood(recent, age)
         pose, axes, floor = then[:, :3], then[:, 3:12].unflatten(1, (3, 3)), then[:, 12]
         depth = image.flatten(1).float()
-        points = into_heading_frame(axes, self.eye + self.rays * (depth * self.far)[..., None])
-        ahead, z = points[..., 0], points[..., 2] - floor[:, None]
+        metres = depth * self.far
+        points = [eye + ray * metres for eye, ray in zip(self.eye, self.rays.T.contiguous(), strict=True)]
+        # part by part: axes times points all at once would be nine numbers a pixel
+        sides = axes.permute(1, 2, 0)[..., None]
+        ahead, left, up = (a * points[0] + b * points[1] + c * points[2] for a, b, c in sides)
+        z = up - floor[:, None]
         known = (depth > 0) & (depth < 1) & (ahead < NEAR)
         z = z - _tilt(z, ahead, known)
-        cells = self._index(pose, points[..., :2])
-        blank = torch.full_like(state.heights, UNSEEN)
-        top = blank.scatter_reduce(1, cells, torch.where(known, z, UNSEEN), "amax")
-        seen = top > 0.5 * UNSEEN
+        cells = self._index(pose, ahead, left)
+        top = torch.full_like(state.heights, UNSEEN)
+        top.scatter_reduce_(1, cells, torch.where(known, z, UNSEEN), "amax")
+        rise = top - state.heights
         # a wall that leaves the image is cut off from above, to its foot: lower points do not make it lower, and what
         # looks like floor in its place wears it down
-        wall, rise = state.heights > WALL, top - state.heights
-        lowered = torch.where(top > _ROUGH, 0.0, _WEAR * rise)
-        rise = torch.where(wall & (rise < 0), lowered, _BLEND * rise)
-        blended = torch.where(state.heights > 0.5 * UNSEEN, state.heights + rise, top)
-        return MapState(state.pose, torch.where(seen, blended, state.heights), recent)
+        lowered = (state.heights > WALL) & (rise < 0)
+        share = torch.where(lowered, torch.where(top > _ROUGH, 0.0, _WEAR), _BLEND)
+        share = torch.where(top > 0.5 * UNSEEN, share, 0.0)  # none where nothing was seen
+        heights = torch.where(state.heights > 0.5 * UNSEEN, state.heights + share * rise, top)
+        return MapState(state.pose, heights, recent)
 
     def read(self, state: MapState) -> Float[Tensor, "n 741"]:
         """Heights above the floor at the planner's points [m]; what was never seen is level floor.
@@ -173,8 +176,7 @@ class ElevationMap(nn.Module):
         half a cell farther out than it does, and a bar would be too deep to straddle. Where two were not seen, or a
         wall stands, the highest counts.
         """
-        points = self.points.expand(len(state.pose), -1, -1)
-        found = torch.gather(state.heights, 1, self._index(state.pose, points))
+        found = torch.gather(state.heights, 1, self._index(state.pose, *self.points.T))
         quarters = found.reshape(len(found), -1, len(_QUARTERS))
         highest = quarters.amax(-1)
         one, other = quarters[..., :2], quarters[..., 2:]
@@ -187,16 +189,20 @@ class ElevationMap(nn.Module):
     def _cell_of(xy: Tensor) -> Tensor:
         return torch.floor(xy / CELL).long()
 
-    def _index(self, pose: Float[Tensor, "n 3"], xy: Float[Tensor, "n k 2"]) -> Int[Tensor, "n k"]:
+    @staticmethod
+    def _index(pose: Float[Tensor, "n 3"], x: Float[Tensor, "*n k"], y: Float[Tensor, "*n k"]) -> Int[Tensor, "n k"]:
         """Of the cells at points of the heading frame."""
-        cell = self._cell_of(pose[:, None, :2] + _turned(pose[:, 2], xy)) % SIDE
-        return cell[..., 0] * SIDE + cell[..., 1]
+        column, row = (
+            torch.floor((at[:, None] + turned) / CELL)
+            for at, turned in zip(pose[:, :2].unbind(1), _turned(pose[:, 2:], x, y), strict=True)
+        )
+        column, row = (cell - SIDE * torch.floor(cell / SIDE) for cell in (column, row))  # whole numbers below 2^24
+        return (column * SIDE + row).long()
 
 
-def _turned(angle: Float[Tensor, " n"], xy: Float[Tensor, "n k 2"]) -> Float[Tensor, "n k 2"]:
-    c, s = torch.cos(angle)[:, None], torch.sin(angle)[:, None]
-    x, y = xy.unbind(-1)
-    return torch.stack([c * x - s * y, s * x + c * y], -1)
+def _turned(angle: Float[Tensor, "n 1"], x: Float[Tensor, "*n k"], y: Float[Tensor, "*n k"]) -> tuple[Tensor, Tensor]:
+    c, s = torch.cos(angle), torch.sin(angle)
+    return c * x - s * y, s * x + c * y
 
 
 def _stood(recent: Float[Tensor, "n ages 13"], age: Float[Tensor, " n"]) -> Float[Tensor, "n 13"]:
