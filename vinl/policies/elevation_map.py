@@ -92,7 +92,7 @@ class ElevationMap(nn.Module):
         quarters = torch.tensor(_QUARTERS, device="cpu") * (CELL / 2)
         middles = torch.tensor(POINTS, dtype=torch.float32, device="cpu")
         for name, numbers in (
-            ("rays", rays),
+            ("rays", rays.T.contiguous()),
             ("eye", torch.tensor(camera.position, dtype=torch.float32, device="cpu")),
             ("points", (middles[:, None] + quarters).reshape(-1, 2)),
         ):
@@ -150,7 +150,7 @@ class ElevationMap(nn.Module):
         pose, axes, floor = then[:, :3], then[:, 3:12].unflatten(1, (3, 3)), then[:, 12]
         depth = image.flatten(1).float()
         metres = depth * self.far
-        points = [eye + ray * metres for eye, ray in zip(self.eye, self.rays.T.contiguous(), strict=True)]
+        points = [eye + ray * metres for eye, ray in zip(self.eye, self.rays, strict=True)]
         # part by part: axes times points all at once would be nine numbers a pixel
         sides = axes.permute(1, 2, 0)[..., None]
         ahead, left, up = (a * points[0] + b * points[1] + c * points[2] for a, b, c in sides)
