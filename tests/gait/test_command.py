@@ -60,26 +60,22 @@ def test_slow_commands_are_raised_over_blocks(boxes, forward, walked, kind):
 
 
 BEFORE, GRAZED = ([0.45, 0.0, 0.0, 0.1, 2.0, 0.0, 2.5],), ([0.6, 0.32, 0.0, 0.4, 0.4, 0.0, 0.7],)
-OPPOSITE, FARTHER = ([0.6, -0.32, 0.0, 0.4, 0.4, 0.0, 0.7],), ([0.6, -0.48, 0.0, 0.4, 0.4, 0.0, 0.7],)
 
 
 @pytest.mark.parametrize(
     ("boxes", "forward", "walked"),
     [
-        (BEFORE, 0.8, 0.0),
+        (BEFORE, 0.8, GRAZING_SPEED),
         (GRAZED, 0.8, GRAZING_SPEED),  # a cabinet 0.12 m beside the middle of the way
-        (GRAZED, 0.1, 0.1),
-        ((*GRAZED, *OPPOSITE), 0.8, 0.0),  # a gap 0.24 m wide
-        ((*GRAZED, *FARTHER), 0.8, GRAZING_SPEED),  # one of 0.4 m
-        (([0.1, 0.0, 0.0, 0.2, 1.0, 0.0, 0.1], *BEFORE), 0.3, 0.0),
-        (BEFORE, 0.1, 0.0),
+        (([0.1, 0.0, 0.0, 0.2, 1.0, 0.0, 0.1], *BEFORE), 0.3, GRAZING_SPEED),
+        (BEFORE, 0.1, 0.1),
         (BEFORE, -0.5, -0.5),  # away from it
         (WALL, 0.8, 0.8),  # half a metre on
         (WALLS_BESIDE, 0.8, 0.8),
         (([0.45, 0.0, 0.0, 0.1, 2.0, 0.0, 0.2],), 0.8, 0.8),  # to be stepped over
     ],
 )
-def test_a_wall_before_the_nose_slows_down_or_stops(boxes, forward, walked):
+def test_a_wall_before_the_nose_slows_down(boxes, forward, walked):
     np.testing.assert_allclose(walked_by(boxes, (forward, 0.1, -0.4)), (walked, 0.1, -0.4), atol=1e-6)
 
 
@@ -90,7 +86,9 @@ def test_without_a_map_commands_stay():
     np.testing.assert_allclose(adapt_command(np, GaitConfig(), None, np.array([command]), feet), [command])
 
 
-@pytest.mark.parametrize(("height", "walked"), [(0.03, CROSSING_SPEED), (0.2, CROSSING_SPEED), (0.02, 0.3), (0.5, 0.0)])
+@pytest.mark.parametrize(
+    ("height", "walked"), [(0.03, CROSSING_SPEED), (0.2, CROSSING_SPEED), (0.02, 0.3), (0.5, GRAZING_SPEED)]
+)
 def test_a_map_from_images_tells_blocks_from_floor_and_walls(height, walked):
     feet = feet_in_heading_frame(np, home_qpos(0.0, 0.0, 0.38, 0.0)[None])
     heights = np.where((POINTS[:, 0] > 0.36) & (POINTS[:, 0] < 0.62), height, 0.0)[None]

@@ -21,9 +21,8 @@ LEAST = 0.1
 """Commands below this are not raised [m/s]: the robot is to stand, or to turn on the spot."""
 
 GRAZING_SPEED = 0.2
-"""Largest forward speed where a wall is right before one side of the trunk [m/s]: at 0.8 m/s it is pushed and feet run
-up it. A robot that stood still would never slide past what it only grazes. Where a wall is before its middle, or before
-both sides, it stands, and turns: in a gap narrower than itself it would be stuck."""
+"""Largest forward speed where a wall is right before the trunk [m/s]: at 0.8 m/s it is pushed and feet run up it. A
+robot that stood still would never slide past what it only grazes."""
 
 
 def _grid(ahead: tuple[float, float, float], aside: tuple[float, float]) -> np.ndarray:
@@ -41,8 +40,8 @@ AHEAD = _grid((0.35, 0.95, 0.1), (0.2, 0.1))
 """(7, 5, 2) where a wall forbids to go faster [m]."""
 
 NOSE = _grid((0.36, 0.41, 0.05), (0.14, 0.07))
-"""(2, 5, 2) where a wall slows or stops a robot [m]: 3 to 9 cm before the trunk, which ends 0.325 m ahead of its
-middle, and nearly as wide, from the right to the left."""
+"""(2, 5, 2) where a wall slows a robot down [m]: 3 to 9 cm before the trunk, which ends 0.325 m ahead of its middle,
+and nearly as wide."""
 
 _ASKED = (UNDER, SOLID), (UNDER, WALL), (AHEAD, WALL), (NOSE, WALL)
 _POINTS = np.concatenate([np.insert(xy.reshape(-1, 2), 2, z, 1) for xy, z in _ASKED]).astype(np.float32)
@@ -53,7 +52,7 @@ _ENDS = np.cumsum([0, *(xy[..., 0].size for xy, _ in _ASKED)]).tolist()
 
 def adapt_command(xp: Any, config: GaitConfig, view: GroundView | None, command: Any, feet: Any) -> Any:
     """(n, 3) the command that robots walk by: over a block across the way at ``CROSSING_SPEED`` at least, unless a wall
-    is ahead, past a wall at ``GRAZING_SPEED`` at most, and not ahead against one or into a gap too narrow.
+    is ahead, and before a wall at ``GRAZING_SPEED`` at most.
 
     A wall is what stands higher than ``WALL`` over the floor, furniture too.
 
@@ -74,8 +73,5 @@ def adapt_command(xp: Any, config: GaitConfig, view: GroundView | None, command:
     wall = ahead.any(-1)
     hurries = over & ~wall & (forward > LEAST) & (forward < CROSSING_SPEED)
     forward = xp.where(hurries, 0 * forward + CROSSING_SPEED, forward)
-    nose = nose.reshape(-1, *NOSE.shape[:2]).any(1)
-    stops = nose[:, 2] | (nose[:, :2].any(-1) & nose[:, 3:].any(-1))
     forward = xp.where(nose.any(-1), xp.clip(forward, None, GRAZING_SPEED), forward)
-    forward = xp.where(stops, xp.clip(forward, None, 0.0), forward)
     return xp.concatenate([forward[:, None], command[:, 1:]], -1)
