@@ -48,7 +48,7 @@ def test_a_wall_is_kept_off_and_no_ground_to_step_over() -> None:
     np.testing.assert_allclose(high.crest(beside), -0.2)  # a block is stepped over
 
 
-def test_a_point_that_is_none_reads_something_and_stops_nothing() -> None:
+def test_a_nan_point_reads_something_and_stops_nothing() -> None:
     rows = np.random.default_rng(1).uniform(0.0, 0.2, (2, len(POINTS))).astype(np.float32)
     view = LocalMapView(torch, torch.from_numpy(rows), torch.zeros(2))
     points = torch.full((2, 3, 3), torch.nan)

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from vinl.gait.proprioception import ROLLING_RADIUS, velocities_by_feet
+from vinl.gait.proprioception import ROLLING_RADIUS, feet_in_trunk, velocities_by_feet
 from vinl.robot.aliengo import FOOT_GEOMS, home_qpos
 from vinl.robot.model import robot_spec
 from vinl.robot.rotation import rotate_inverse
@@ -25,7 +25,8 @@ def test_a_foot_that_rolls_tells_how_fast_the_trunk_moves() -> None:
         data.qvel[:3] -= place @ data.qvel  # the point that the foot rolls about is at rest
         turned, speeds = data.qpos[None, 3:7], data.qvel[None]
         gravity = rotate_inverse(np, turned, np.array([[0.0, 0.0, -1.0]]))
-        told = velocities_by_feet(np, data.qpos[None, 7:], speeds[:, 6:], gravity, speeds[:, 3:6])
+        joints = data.qpos[None, 7:]
+        told = velocities_by_feet(np, feet_in_trunk(np, joints), joints, speeds[:, 6:], gravity, speeds[:, 3:6])
         trunk = rotate_inverse(np, turned, speeds[:, :3])
         np.testing.assert_allclose(told[0, k % 4], trunk[0], atol=0.01)  # joints are taken back by a control step
         assert np.abs(trunk).max() > 0.02

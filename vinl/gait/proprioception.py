@@ -29,17 +29,17 @@ def feet_in_trunk(xp: Any, joints: Any) -> Any:
     return xp.stack([ahead, c * aside - s * below, s * aside + c * below], -1) + at_hips
 
 
-def velocities_by_feet(xp: Any, joints: Any, speeds: Any, gravity: Any, turning: Any) -> Any:
+def velocities_by_feet(xp: Any, feet: Any, joints: Any, speeds: Any, gravity: Any, turning: Any) -> Any:
     """(n, 4, 3) how fast the trunk moves in its own frame, if each foot rolls on the ground and does not slip [m/s].
 
     Args:
         xp: ``numpy``, ``jax.numpy`` or ``torch``.
+        feet: (n, 4, 3) of ``feet_in_trunk`` [m].
         joints: (n, 12) angles [rad].
         speeds: (n, 12) of the joints [rad/s].
         gravity: (n, 3) its direction in the trunk's frame.
         turning: (n, 3) angular velocity of the trunk, in its frame [rad/s].
     """
-    feet = feet_in_trunk(xp, joints)
     moved = (feet_in_trunk(xp, joints - CONTROL_DT * speeds) - feet) / CONTROL_DT
     turned, up = (xp.broadcast_to(x[:, None], feet.shape) for x in (turning, -gravity))
     hip, bend = speeds[:, 0::3], speeds[:, 1::3] + speeds[:, 2::3]

@@ -187,13 +187,15 @@ class ElevationMap(nn.Module):
 
     @staticmethod
     def _cell_of(xy: Tensor) -> Tensor:
-        return torch.floor(xy / CELL).long()
+        return torch.floor(xy / CELL)
 
-    @staticmethod
-    def _index(pose: Float[Tensor, "n 3"], x: Float[Tensor, "*n k"], y: Float[Tensor, "*n k"]) -> Int[Tensor, "n k"]:
+    @classmethod
+    def _index(
+        cls, pose: Float[Tensor, "n 3"], x: Float[Tensor, "*n k"], y: Float[Tensor, "*n k"]
+    ) -> Int[Tensor, "n k"]:
         """Of the cells at points of the heading frame."""
         column, row = (
-            torch.floor((at[:, None] + turned) / CELL)
+            cls._cell_of(at[:, None] + turned)
             for at, turned in zip(pose[:, :2].unbind(1), _turned(pose[:, 2:], x, y), strict=True)
         )
         column, row = (cell - SIDE * torch.floor(cell / SIDE) for cell in (column, row))  # whole numbers below 2^24
@@ -212,7 +214,7 @@ def _stood(recent: Float[Tensor, "n ages 13"], age: Float[Tensor, " n"]) -> Floa
     return torch.where((then == 0).all(1, keepdim=True), recent[:, 0], then)
 
 
-def _place(cell: Int[Tensor, "n 2"]) -> Int[Tensor, "n 2 side"]:
+def _place(cell: Float[Tensor, "n 2"]) -> Float[Tensor, "n 2 side"]:
     """Which of the cells that do not move each column and row stands for with the robot in this one."""
     return cell[..., None] + (torch.arange(SIDE, device=cell.device) - cell[..., None] + SIDE // 2) % SIDE
 

@@ -177,7 +177,8 @@ class SteppingActor(PolicyNetwork):
         felt["joint_position"] = felt["joint_position"] + self.default_pose
         joints, gravity = felt["joint_position"], felt["projected_gravity"]
         axes, feet = heading_axes(torch, gravity), feet_in_trunk(torch, joints)
-        by_feet = velocities_by_feet(torch, joints, felt["joint_velocity"], gravity, felt["base_angular_velocity"])
+        speeds, turning = felt["joint_velocity"], felt["base_angular_velocity"]
+        by_feet = velocities_by_feet(torch, feet, joints, speeds, gravity, turning)
         return Stance(felt, axes, into_heading_frame(axes, feet), by_feet)
 
     def network_input(self, vector: Float[Tensor, "n 45"], stance: Stance, memory: Memory) -> Float[Tensor, "n 68"]:
