@@ -1,12 +1,13 @@
 """Robots in homes: motion, reward, ends, restarts, repetition."""
 
+import math
 from dataclasses import replace
 
 import pytest
 import torch
 
 from vinl.config.errors import InputError
-from vinl.nav.config import EpisodeConfig
+from vinl.nav.config import EpisodeConfig, ExecutionConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.learning_config import NavPpoConfig
 from vinl.policies.places import VIEW
@@ -106,11 +107,26 @@ def test_a_cancelled_step_is_seen_unless_the_paper_asks(config, homes, previous)
     assert (step.vector[step.done, 3:] == 0).all()
 
 
+def test_a_robot_that_pushes_against_a_wall_measures_how_its_legs_sway(config, homes):
+    execution = ExecutionConfig(stopped_noise=0.1)
+    environment = NavEnvironment(
+        replace(config, num_envs=300, camera=None, previous="both", execution=execution), homes
+    )
+    for _ in range(12):
+        step = environment.step(torch.tensor([[1.0, 0.0]]).expand(300, 2))
+    stopped = (environment.state["in_a_row"] > 0) & ~step.done
+    speed = (step.vector[stopped, -2] + 1) / 2 * config.robot.max_speed
+    assert stopped.sum() > 50
+    # backwards reads as standing: half of a normal distribution
+    assert 0.4 < (speed > 0).float().mean() < 0.6
+    assert speed.square().mean().sqrt().item() == pytest.approx(0.1 / math.sqrt(2), rel=0.2)
+    assert (environment.state["twist"][stopped, :2] == 0).all()
+
+
 @pytest.mark.parametrize("lowest", [0.0, -0.3])
 def test_the_motion_seen_is_what_the_poses_say(config, homes, lowest):
     """The chain measures the same from the poses of the robot's trunk (``vinl.chain.navigators.learned``)."""
     from vinl.chain.navigators.learned import measure_twist
-    from vinl.nav.config import ExecutionConfig
 
     execution = ExecutionConfig(
         speed_lag=0.1, yaw_lag=0.05, speed_gain=(0.8, 1.0), yaw_noise=0.2, speed_noise=0.1, side_slip=0.1

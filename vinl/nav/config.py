@@ -149,6 +149,8 @@ class ExecutionConfig:
         speed_noise, yaw_noise: standard deviation of a step's mean forward speed [m/s] and yaw rate [rad/s], for a
             robot at full speed; less in proportion when slower or turning less (half of it when it stands).
         side_slip: standard deviation of a step's mean sideways speed [m/s], in proportion to the forward speed.
+        stopped_noise: standard deviation of the forward speed that a robot measures whose step was cancelled [m/s]:
+            legs that push against a wall sway.
         yaw_drift: yaw rate of an episode when walking at full speed, uniform within +- this [rad/s].
         amplitude: range of a factor of an episode on the noises and the slip, uniform; 0 is sure of foot.
         give_way: a step that would touch something is not cancelled as a whole: the robot turns on the spot, and
@@ -162,12 +164,13 @@ class ExecutionConfig:
     speed_noise: float = 0.0
     yaw_noise: float = 0.0
     side_slip: float = 0.0
+    stopped_noise: float = 0.0
     yaw_drift: float = 0.0
     amplitude: Range = (1.0, 1.0)
     give_way: float = 0.0
 
     def __post_init__(self) -> None:
-        unit = dict.fromkeys(("speed_noise", "yaw_noise", "side_slip", "yaw_drift"), (0, 1))
+        unit = dict.fromkeys(("speed_noise", "yaw_noise", "side_slip", "stopped_noise", "yaw_drift"), (0, 1))
         lags, gains = dict.fromkeys(("speed_lag", "yaw_lag"), (0, 5)), dict.fromkeys(("speed_gain", "yaw_gain"), (0, 2))
         check_limits(self, "execution.", **lags, **gains, **unit, amplitude=(0, 10), give_way=(0.0, 0.5))
 

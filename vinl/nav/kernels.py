@@ -63,6 +63,7 @@ class Rules:
     speed_noise: wp.float32
     yaw_noise: wp.float32
     side_slip: wp.float32
+    stopped_noise: wp.float32
     yaw_drift: wp.float32
     execution_amplitude: wp.vec2
     give_way: wp.float32
@@ -245,10 +246,13 @@ def move_robots(
         slip = float(0.0)
         blocked[n] = 1.0
     robots.twist[n] = wp.vec3(v, slip, w)
+    seen = v
+    if hit and rules.stopped_noise > 0.0:  # drawn only then: without it all else stays the same
+        seen = rules.stopped_noise * gain[3] * wp.randn(state)
     heading = yaw + w * rules.period
     robots.previous[n] = wp.vec2(a0, a1)
     if rules.sees_motion != 0:
-        fraction = (v - rules.min_speed) / (rules.max_speed - rules.min_speed)
+        fraction = (seen - rules.min_speed) / (rules.max_speed - rules.min_speed)
         robots.previous[n] = wp.vec2(
             wp.clamp(2.0 * fraction - 1.0, -1.0, 1.0), wp.clamp(w / rules.max_yaw_rate, -1.0, 1.0)
         )
