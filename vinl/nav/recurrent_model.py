@@ -84,7 +84,8 @@ class RecurrentActorCritic(nn.Module):
     ) -> Outlook:
         """What is made of t steps; images in [0, 1] or as bytes."""
         actor = cast(MemoryActor, self.actor)
-        feature, state = actor.look(as_unit(depth), vector, state, fresh)
+        images = None if depth is None else as_unit(depth)
+        feature, state = actor.look(images, vector, state, fresh)
         feature = feature.float()
         with torch.autocast(feature.device.type, enabled=False):
             guess = feature[..., :0] if self.guess is None else self.guess(feature)
@@ -109,10 +110,8 @@ class RecurrentActorCritic(nn.Module):
         return self.log_std.exp()
 
 
-def as_unit(depth: Tensor | None) -> Tensor | None:
+def as_unit(depth: Tensor) -> Tensor:
     """Stored images as numbers in [0, 1] of the type that the network computes in."""
-    if depth is None:
-        return None
     kind = depth.device.type
     wanted = torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else torch.float32
     return depth.to(wanted) / 255.0 if depth.dtype == torch.uint8 else depth.to(wanted)

@@ -16,6 +16,7 @@ from tensordict import TensorDict
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
+from vinl.nav.compiled_vision import CompiledVision
 from vinl.nav.config import NavConfig
 from vinl.nav.learning_config import NavPpoConfig
 from vinl.nav.recurrent_model import RecurrentActorCritic, RecurrentStorage
@@ -66,8 +67,9 @@ class RecurrentPPO:
         )
         rate.bind(self.optimizer)
         vision = getattr(getattr(model.actor, "memory", None), "vision", None)
+        self._compiled: CompiledVision | None = None
         if config.compiled and on_gpu and isinstance(vision, nn.Module):
-            vision.compile(dynamic=False)  # fuses what lies between convolutions; the names of the weights stay
+            self._compiled = CompiledVision(vision)  # fuses what lies between convolutions
         self._state = tuple(part.clone() for part in storage.state)
         self._fresh = torch.ones(storage.robots, dtype=torch.bool, device=self.device)
         self._sums = torch.zeros(len(_SUMS), device=self.device)
@@ -92,6 +94,8 @@ class RecurrentPPO:
         depth = self._keep(observation, t)
         st.fresh[t] = self._fresh
         with torch.no_grad(), self._precision():
+            if self._compiled is not None and depth is not None:
+                self._compiled.check(depth)
             seen = self.model(depth, st.vector[t][None], self._state, self._fresh[None])
         self._remember(seen.state)
         mean, noise = seen.mean[0], torch.randn_like(seen.mean[0])
@@ -200,6 +204,8 @@ class RecurrentPPO:
         s, st, model = self.config, self.storage, self.model
         batch = st.take(robots)
         with self._precision():
+            if self._compiled is not None and batch.depth is not None:
+                self._compiled.check(batch.depth)
             mean, value, _, guess = model(batch.depth, batch.vector, batch.state, batch.fresh)
         log_std = model.log_std
         log_ratio = _log_prob(batch.actions, mean, log_std) - batch.log_prob
