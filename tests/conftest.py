@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import hypothesis
 import pytest
+import sparing_checks
 from beartype import BeartypeConf, beartype
 from jaxtyping import install_import_hook
 
@@ -46,6 +47,7 @@ def _checked_modules() -> list[str]:
 _checker = ModuleType("vinl_type_checker")
 _checker.check = beartype(conf=BeartypeConf(is_pep484_tower=True))  # type: ignore[attr-defined]  # an int is a float
 sys.modules["vinl_type_checker"] = _checker
+sparing_checks.install()
 install_import_hook(_checked_modules(), "vinl_type_checker.check")  # before the first import of vinl in this process
 
 pytest_plugins = ["small_home"]
@@ -66,6 +68,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files with slow tests first: what is left for the end is short, and no process waits long for the other."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in slow)
+
+
+def pytest_runtest_setup() -> None:
+    """Shapes and types of the first calls of every function are checked anew in each test."""
+    sparing_checks.begin_test()
 
 
 def _processor() -> str:

@@ -1,0 +1,64 @@
+"""Array shapes and types are checked in every test, but not in every call: a loop asks the same a thousand times, and a
+check costs more than many of the functions that it stands before."""
+
+from __future__ import annotations
+
+import functools
+from types import CodeType, FunctionType
+from typing import TYPE_CHECKING, Any
+
+import jaxtyping
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_FIRST, _EVERY = 10, 50
+"""Calls of a function that are checked in each test: so many, then every fiftieth."""
+
+_check_all = jaxtyping.jaxtyped
+_is_compiling: Callable[[], bool]
+_test = 0
+_calls: dict[CodeType, tuple[int, int]] = {}
+"""Of each function, in which test it was called last, and how often in it."""
+
+
+def begin_test() -> None:
+    """Check the first calls of every function again."""
+    global _test
+    _test += 1
+
+
+def install() -> None:
+    """Let ``jaxtyping.install_import_hook`` check sparingly what is imported from now on."""
+    import torch  # not before the number of its threads is set
+
+    global _is_compiling
+    _is_compiling = torch.compiler.is_compiling
+    jaxtyping.jaxtyped = _check_sparingly  # type: ignore[assignment]
+
+
+def _check_sparingly(*, typechecker: Callable[..., Any]) -> Callable[[Any], Any]:
+    whole = _check_all(typechecker=typechecker)
+
+    def decorate(fn: Any) -> Any:
+        if not isinstance(fn, FunctionType):
+            return whole(fn)
+        code, checked = fn.__code__, None
+
+        @functools.wraps(fn)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            nonlocal checked
+            if _is_compiling():  # what is counted would become a part of the program
+                return fn(*args, **kwargs)
+            test, count = _calls.get(code, (_test, 0))
+            count = count + 1 if test == _test else 1
+            _calls[code] = _test, count
+            if count > _FIRST and count % _EVERY:
+                return fn(*args, **kwargs)
+            if checked is None:  # only now: to write a checker takes a millisecond, and inner functions are made often
+                checked = whole(fn)
+            return checked(*args, **kwargs)
+
+        return call
+
+    return decorate
