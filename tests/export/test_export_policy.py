@@ -15,12 +15,11 @@ from vinl.export.metadata import explain_rows, read_metadata
 from vinl.export.parity import LIMIT, ExportedPolicy
 from vinl.export.policy import Exported, ParityError, build_model, export_policy
 from vinl.gait.observation import SENSED_TABLE
-from vinl.policies.card import PolicyCard, describe_action, navigation_card
+from vinl.policies.card import navigation_card
 from vinl.policies.depth_policy import DepthPolicy
 from vinl.policies.identity import digest_weights
 from vinl.policies.io import list_policies, load_policy, save_policy
 from vinl.policies.nav_actor import NavActor
-from vinl.policies.stepping_actor import SteppingActor
 from vinl.robot.aliengo import DEFAULT_POSE, JOINTS
 from vinl.robot.cameras import NAVIGATION_CAMERA
 
@@ -118,23 +117,19 @@ def test_a_file_that_answers_otherwise_is_not_written(monkeypatch: pytest.Monkey
     assert {path.name for path in Path().iterdir()} == {"runs"}
 
 
-@pytest.mark.slow
-def test_a_gait_is_an_input_and_an_output():
-    """With the whole planner of footholds in the file."""
-    torch.manual_seed(0)
-    network = SteppingActor(hidden=16, layers=1, actor=(16,))
-    network.requires_grad_(False)
-    network.velocity.weight.normal_(std=1.0)
-    card = PolicyCard("locomotion", "stepping", network.describe(), SENSED_TABLE.describe(), describe_action())
-    loaded = DepthPolicy(network, card)
-    Path("gait.onnx").write_bytes(build_model(loaded).SerializeToString())
-    file = ExportedPolicy("gait.onnx")
+def test_a_gait_is_an_input_and_an_output(exported: dict[str, tuple[Path, Exported]]):
+    """With the whole planner of footholds in the file, and a second episode that knows nothing of the first."""
+    file, loaded = ExportedPolicy(exported["loco"][0]), load_policy("loco")
+    assert isinstance(loaded, DepthPolicy) and loaded.camera is not None
     states = {state["input"]: (state["shape"], state["start"]) for state in file.about["states"]}
     assert states == {
-        "hidden": ([1, 1, 16], 0.0),
-        "cell": ([1, 1, 16], 0.0),
+        "hidden": ([2, 1, 256], 0.0),
+        "cell": ([2, 1, 256], 0.0),
         "gait": ([1, 1, 40], 0.0),
         "velocity": ([1, 1, 3], 0.0),
+        "pose": ([1, 1, 3], 0.0),
+        "heights": ([1, 1, 12544], -10.0),
+        "recent": ([1, 1, 8, 13], 0.0),
         "begun": ([1, 1], 0.0),
     }
     random = np.random.default_rng(0)
@@ -145,7 +140,10 @@ def test_a_gait_is_an_input_and_an_output():
         file.reset()
         for _ in range(20):
             observation = (still + 0.05 * random.normal(size=len(still))).astype(np.float32)
-            np.testing.assert_allclose(file.act(observation), loaded.act(observation[None])[0], atol=1e-5)
+            depth = random.uniform(0.3, 3.0, (loaded.camera.height, loaded.camera.width)).astype(np.float32)
+            age = float(random.uniform(0.0, 0.04))
+            wanted = loaded.act(observation[None], depth[None], np.array([age], np.float32))[0]
+            np.testing.assert_allclose(file.act(observation, depth, age), wanted, atol=LIMIT)
 
 
 def test_rows_explain_themselves():
