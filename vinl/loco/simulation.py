@@ -191,6 +191,7 @@ class Simulation:
         self._bare = ((bare - low) / span).astype(np.float32).reshape(-1)
         self._solid, self._is_solid = normalised, True
         self._ground_rows, self._leg_rows = self._find_contact_rows()
+        self._substeps = jax.vmap(self._control_step, in_axes=(None, 0, 0, 0))
 
     def set_solid(self, solid: bool) -> None:
         """From the next step on blocks collide, or are only seen and judged; nothing is compiled anew."""
@@ -248,36 +249,22 @@ class Simulation:
         Returns:
             The new state, the latched contacts and the torques of the last substep [N m].
         """
-        own = jax.vmap(self._own_parts)(traits)
-        model = self._mx.replace(hfield_data=ground.normalised, **own)
-        axes = jax.tree.map(lambda _: None, self._mx).replace(**dict.fromkeys(own, 0))
-        move = jax.vmap(self._substep, in_axes=(None, axes, 0, 0, 0))
-
-        # the loop outside, all robots inside: the other way round the physics is traced twice
-        def substep(carry: tuple[Body, Contacts, Array], k: Array) -> tuple[tuple[Body, Contacts, Array], None]:
-            newest = jnp.take_along_axis(targets, target_age(k, delay)[:, None, None], 1)[:, 0]
-            return move(ground, model, *carry[:2], newest), None
-
-        count = len(delay)
-        nothing = jax.tree.map(lambda x: jnp.zeros((count, *x.shape), x.dtype), Contacts.none())
-        start = body, nothing, jnp.zeros((count, 12))
-        return jax.lax.scan(substep, start, jnp.arange(SUBSTEPS))[0]
+        return self._substeps(ground, body, (targets, delay), traits)
 
     def robot_model(self, ground: DeviceGround, traits: Traits) -> mjx.Model:
         """The model of one robot on its ground; ``traits`` without their first axis."""
-        return self._mx.replace(hfield_data=ground.normalised, **self._own_parts(traits))
-
-    def _own_parts(self, traits: Traits) -> dict[str, Array]:
-        """What of the model is one robot's own."""
         mx = self._mx
-        return {
-            "geom_friction": mx.geom_friction.at[self._feet, 0].set(traits.friction),
-            "body_mass": mx.body_mass.at[self._trunk].add(traits.added_mass),
-            "actuator_gainprm": mx.actuator_gainprm.at[:, 0].multiply(traits.kp),
-            "actuator_biasprm": mx.actuator_biasprm.at[:, 1].multiply(traits.kp).at[:, 2].multiply(traits.kd),
-            "dof_frictionloss": mx.dof_frictionloss * traits.joint_friction,
-            "dof_damping": mx.dof_damping * traits.joint_friction,
-        }
+        gain = mx.actuator_gainprm.at[:, 0].multiply(traits.kp)
+        bias = mx.actuator_biasprm.at[:, 1].multiply(traits.kp).at[:, 2].multiply(traits.kd)
+        return mx.replace(
+            hfield_data=ground.normalised,
+            geom_friction=mx.geom_friction.at[self._feet, 0].set(traits.friction),
+            body_mass=mx.body_mass.at[self._trunk].add(traits.added_mass),
+            actuator_gainprm=gain,
+            actuator_biasprm=bias,
+            dof_frictionloss=mx.dof_frictionloss * traits.joint_friction,
+            dof_damping=mx.dof_damping * traits.joint_friction,
+        )
 
     def physics_step(self, model: mjx.Model, body: Body, target: Float[Array, "12"]) -> mjx.Data:
         """5 ms of one robot with joint targets [rad]."""
@@ -285,13 +272,21 @@ class Simulation:
         qpos, qvel, warm = body
         return mjx.step(model, self._start.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warm, ctrl=target))
 
-    def _substep(
-        self, ground: DeviceGround, model: mjx.Model, body: Body, contacts: Contacts, target: Float[Array, "12"]
+    def _control_step(
+        self, ground: DeviceGround, body: Body, told: tuple[Float[Array, "past 12"], Int[Array, ""]], traits: Traits
     ) -> tuple[Body, Contacts, Float[Array, "12"]]:
-        """A physics step of one robot: its new state, the contacts latched so far, the torques [N m]."""
-        data = self.physics_step(model, body, target)
-        contacts = jax.tree.map(jnp.logical_or, contacts, self._touching(ground, data))
-        return Body(data.qpos, data.qvel, data.qacc_warmstart), contacts, data.actuator_force
+        """The substeps of one robot."""
+        model = self.robot_model(ground, traits)
+        targets, delay = told
+
+        def substep(carry, k):
+            body, contacts, _ = carry
+            data = self.physics_step(model, body, targets[target_age(k, delay)])
+            contacts = jax.tree.map(jnp.logical_or, contacts, self._touching(ground, data))
+            return (Body(data.qpos, data.qvel, data.qacc_warmstart), contacts, data.actuator_force), None
+
+        start = body, Contacts.none(), jnp.zeros(12)
+        return jax.lax.scan(substep, start, jnp.arange(SUBSTEPS))[0]
 
     def _touching(self, ground: DeviceGround, data: mjx.Data) -> Contacts:
         """The contacts of one robot after a physics step."""
