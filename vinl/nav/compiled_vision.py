@@ -16,7 +16,8 @@ asked for, and NaN after two steps (docs/research/2026-11-28-compiled-wrongly.md
 and reads them without [pytorch issue 179931]."""
 
 _TOLERANCE = 0.1
-"""Largest relative difference of the features: bfloat16 makes 0.01, rows of other images about 1."""
+"""Largest relative difference of the features. Measured with an untrained ResNet, 64 images, on a CPU: bfloat16 for
+float32 makes 0.02, rows of other images 0.27, numbers shifted by two 1.2."""
 
 
 class CompiledVision:

@@ -19,7 +19,7 @@ from vinl.config.errors import InputError
 from vinl.nav.compiled_vision import CompiledVision
 from vinl.nav.config import NavConfig
 from vinl.nav.learning_config import NavPpoConfig
-from vinl.nav.recurrent_model import RecurrentActorCritic, RecurrentStorage
+from vinl.nav.recurrent_model import Outlook, RecurrentActorCritic, RecurrentStorage
 from vinl.policies.nav_actor import NavActor
 from vinl.policies.places import VIEW
 from vinl.rl.learning_rate import DeviceRate
@@ -93,10 +93,8 @@ class RecurrentPPO:
             st.begin(self._state, self.model.log_std)
         depth = self._keep(observation, t)
         st.fresh[t] = self._fresh
-        with torch.no_grad(), self._precision():
-            if self._compiled is not None and depth is not None:
-                self._compiled.check(depth)
-            seen = self.model(depth, st.vector[t][None], self._state, self._fresh[None])
+        with torch.no_grad():
+            seen = self._look(depth, st.vector[t][None], self._state, self._fresh[None])
         self._remember(seen.state)
         mean, noise = seen.mean[0], torch.randn_like(seen.mean[0])
         st.means[t], st.values[t] = mean, seen.value[0]
@@ -120,8 +118,8 @@ class RecurrentPPO:
         """Advantages of the roll-out, normalised; ``observation`` is the one after its last step."""
         st, s = self.storage, self.config
         depth = st.as_stored(observation["depth"])[None] if st.depth is not None else None
-        with torch.no_grad(), self._precision():
-            seen = self.model(depth, observation["vector"][None], self._state, self._fresh[None])
+        with torch.no_grad():
+            seen = self._look(depth, observation["vector"][None], self._state, self._fresh[None])
         st.estimate_advantages(seen.value[0], s.gamma, s.lam)
         mean = st.advantages.mean()
         self.peers.average(mean)
@@ -196,17 +194,18 @@ class RecurrentPPO:
         for part, now in zip(self._state, state, strict=True):
             part.copy_(now)
 
-    def _precision(self) -> torch.autocast:
-        return torch.autocast(self.device.type, torch.bfloat16, enabled=self._bf16)
+    def _look(self, depth: Tensor | None, vector: Tensor, state: tuple[Tensor, ...], fresh: Tensor) -> Outlook:
+        """What the model makes of t steps, in the precision of the training; see ``RecurrentActorCritic.forward``."""
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self._bf16):
+            if self._compiled is not None and depth is not None:
+                self._compiled.check(depth)
+            return self.model(depth, vector, state, fresh)
 
     def _learn(self, robots: Tensor) -> None:
         """One step of the optimiser on all steps of some robots."""
         s, st, model = self.config, self.storage, self.model
         batch = st.take(robots)
-        with self._precision():
-            if self._compiled is not None and batch.depth is not None:
-                self._compiled.check(batch.depth)
-            mean, value, _, guess = model(batch.depth, batch.vector, batch.state, batch.fresh)
+        mean, value, _, guess = self._look(batch.depth, batch.vector, batch.state, batch.fresh)
         log_std = model.log_std
         log_ratio = _log_prob(batch.actions, mean, log_std) - batch.log_prob
         ratio = log_ratio.exp()
