@@ -279,6 +279,7 @@ class NavRewardConfig:
         success: once, at the goal.
         progress: for each metre that the geodesic distance shrinks.
         slack: every step.
+        path: for each metre moved.
         collision: every step that is cancelled because the robot would touch something.
         near: every step that ends with a wall or furniture within ``margin`` of the rectangle: feet swing beside and
             ahead of the trunk, and what they meet throws the robot.
@@ -289,6 +290,7 @@ class NavRewardConfig:
     success: float = 10.0
     progress: float = 1.0
     slack: float = -0.002
+    path: float = 0.0
     collision: float = -0.003
     near: float = 0.0
     margin: float = 0.12

@@ -15,7 +15,16 @@ from torch import Tensor
 from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
 from vinl.nav.home_store import HomeStore
-from vinl.nav.kernels import Robots, aim_cameras, draw_keys, move_robots, place_robots, render_interior, write_rules
+from vinl.nav.kernels import (
+    Robots,
+    aim_cameras,
+    draw_keys,
+    look_along_paths,
+    move_robots,
+    place_robots,
+    render_interior,
+    write_rules,
+)
 from vinl.policies.places import blank_places, view_places, visit_places
 from vinl.robot.cameras import Camera
 from vinl.sensing.depth import check_device
@@ -31,6 +40,8 @@ _DRAWN_AT_START, _DRAWN_AT_LOOK = 1, 3
 DISTANCE_UNIT = 5.0
 """The observation holds the distance to the goal in this unit [m]."""
 
+PATH_AHEAD = (1.0, 4.0)
+"""Where the shortest path leads after these lengths is what a critic is told [m]: the next turn, and the next door."""
 
 STUCK_STEPS = 10
 """An episode that runs out of time after at least so many cancelled steps in a row counts as stuck."""
@@ -201,6 +212,8 @@ class NavEnvironment:
         self.state["action"] = self._zeros(n, 2)
         self.state["chance"] = self._zeros(2, dtype=torch.int32)
         self._moved, self._blocked, self._near, self._straight = (self._zeros(n) for _ in range(4))
+        self._lengths = torch.tensor(PATH_AHEAD, device=self.device)
+        self._points = self._zeros(n, 2 * len(PATH_AHEAD))
         self._camera_pose = self._zeros(n, 3), self._zeros(n, 3, 3)
         self._sensor: DepthSensor | None = None
         if self.camera is not None:
@@ -224,6 +237,8 @@ class NavEnvironment:
             "near": wp.from_torch(self._near),
             "straight": wp.from_torch(self._straight),
             "chosen": wp.from_torch(self._chosen),
+            "lengths": wp.from_torch(self._lengths),
+            "points": wp.from_torch(self._points),
             "camera": wp.from_torch(self._camera_pose[0], dtype=wp.vec3),
             "rotation": wp.from_torch(self._camera_pose[1], dtype=wp.mat33),
             "key": wp.from_torch(self._key),
@@ -274,6 +289,12 @@ class NavEnvironment:
         if "places" not in self.state:
             raise InputError("robots keep track of where they have been if ppo.places is above 0")
         return view_places(self.state["places"], self.state["position"], self.state["yaw"])
+
+    def look_along_paths(self) -> Float[Tensor, "n k"]:
+        """Where the shortest paths to the goals lead, which the robots do not know: for each of ``PATH_AHEAD`` the
+        point after so many metres, ahead and to the left of the robot in that length; then the path's length / 5 m."""
+        self._launch(look_along_paths, self.num_envs, [self.homes.homes, self._robots, "lengths", "points"])
+        return torch.cat([self._points, self.distance[:, None] / DISTANCE_UNIT], 1)
 
     def read_measures(self) -> dict[str, float]:
         """Means over the episodes that ended since the last call (``success``, ``spl``, ``soft_spl``, ``collisions``,
@@ -337,6 +358,7 @@ class NavEnvironment:
         timeout = (state["steps"] >= episodes.steps) & ~success
         done = success | timeout
         reward = rules.progress * (before - state["distance"]) + rules.success * success
+        reward += rules.path * self._moved
         reward += rules.slack + rules.collision * self._blocked + rules.near * self._near
         reward = rules.scale * reward
         self.ended = end_episodes(state, done, success)

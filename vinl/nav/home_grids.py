@@ -87,6 +87,36 @@ def read_distance(homes: Homes, home: wp.int32, goal: wp.int32, p: wp.vec2) -> w
 
 @wp.func
 @no_type_check
+def follow_path(homes: Homes, home: wp.int32, goal: wp.int32, start: wp.vec2, until: wp.float32) -> wp.vec2:
+    """The cell on the shortest path where the distance to the goal is ``until`` [m], or the goal's; that of ``start``
+    where no cell around knows a path."""
+    rows = homes.shape[home][0]
+    columns = homes.shape[home][1]
+    j = wp.int32(wp.floor((start[0] - homes.origin[home][0]) / FIELD + 0.5))
+    i = wp.int32(wp.floor((start[1] - homes.origin[home][1]) / FIELD + 0.5))
+    distance = float(NOWHERE)
+    going = bool(True)
+    while going:
+        going = False
+        to_i = int(i)
+        to_j = int(j)
+        for s in range(9):
+            a = i + s // 3 - 1
+            b = j + s % 3 - 1
+            if a >= 0 and b >= 0 and a < rows and b < columns:
+                value = wp.float32(homes.fields[homes.first[home] + a * columns + b, goal])
+                if wp.isfinite(value) and value < distance:
+                    distance = value
+                    to_i = a
+                    to_j = b
+                    going = distance > until
+        i = to_i
+        j = to_j
+    return homes.origin[home] + FIELD * wp.vec2(wp.float32(j), wp.float32(i))
+
+
+@wp.func
+@no_type_check
 def touches(homes: Homes, home: wp.int32, p: wp.vec2, yaw: wp.float32, length: wp.float32, width: wp.float32) -> bool:
     """Whether the robot's rectangle reaches a wall or furniture: five discs along it and one in each corner fill it
     but for 2 cm at the corners."""

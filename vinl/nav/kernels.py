@@ -11,7 +11,7 @@ from typing import Any, no_type_check
 import warp as wp
 
 from vinl.nav.config import NavConfig
-from vinl.nav.home_grids import FIELD, NOWHERE, Homes, read_distance, touches
+from vinl.nav.home_grids import FIELD, NOWHERE, Homes, follow_path, read_distance, touches
 from vinl.sensing.kernels import look_through
 from vinl.sensing.sensor_kernels import Cameras
 from vinl.sensing.torch_warp import fill_struct
@@ -333,6 +333,24 @@ def place_robots(
     if wp.randf(state) < rules.ceiling_share:
         ceiling = mix(rules.ceiling, wp.randf(state))
     robots.mount[n] = wp.vec4(roll, pitch, height, ceiling)
+
+
+@wp.kernel
+@no_type_check
+def look_along_paths(
+    homes: Homes, robots: Robots, lengths: wp.array(dtype=wp.float32), points: wp.array(dtype=wp.float32, ndim=2)
+):
+    """Where the shortest paths to the goals lead, after each of some lengths [m]: points ahead and left of the robots,
+    in these lengths."""
+    n = wp.tid()
+    home = robots.home[n]
+    c = wp.cos(robots.yaw[n])
+    s = wp.sin(robots.yaw[n])
+    for k in range(lengths.shape[0]):
+        until = robots.distance[n] - lengths[k]
+        away = follow_path(homes, home, robots.goal[n], robots.position[n], until) - robots.position[n]
+        points[n, 2 * k] = (c * away[0] + s * away[1]) / lengths[k]
+        points[n, 2 * k + 1] = (c * away[1] - s * away[0]) / lengths[k]
 
 
 @wp.kernel

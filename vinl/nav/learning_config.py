@@ -65,6 +65,8 @@ class NavPpoConfig:
         places: weight of a further loss: a linear layer on the memory's output is to tell where in the 4 m around it
             the robot has been lately (``vinl.policies.places``), so that the memory learns to keep places and to know
             them again. Motion and images hold all that it takes. 0: none.
+        paths: weight of a further loss: that layer is to tell, too, where the shortest path leads in 1 and 4 m, and how
+            long it is, so that the memory learns what homes are like. The critic is told all of this. 0: none.
         max_grad_norm: gradients are clipped to this norm.
         log_std, log_std_range: logarithm of the actions' standard deviation at the start, and its limits.
         last_log_std: from ``cool_from`` on the upper limit moves to this: what is shipped acts without chance, and
@@ -93,6 +95,7 @@ class NavPpoConfig:
     entropy: float = 0.003
     last_entropy: float | None = None
     places: float = 0.0
+    paths: float = 0.0
     max_grad_norm: float = 0.5
     log_std: float = -0.5
     log_std_range: tuple[float, float] = (-2.0, 0.2)
@@ -109,7 +112,7 @@ class NavPpoConfig:
             "ppo.",
             counts=("steps", "epochs", "minibatches"),
             positive=("desired_kl", "last_rate", "clip", "max_grad_norm", "gamma"),
-            unsigned=("value", "entropy", "last_entropy", "places", "critic_warmup"),
+            unsigned=("value", "entropy", "last_entropy", "places", "paths", "critic_warmup"),
             fractions=("gamma", "lam", "cool_from"),
         )
         if self.image_type not in IMAGE_TYPES:

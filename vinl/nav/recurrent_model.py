@@ -22,6 +22,9 @@ from vinl.policies.io import load_policy
 from vinl.policies.nav_actor import PREVIOUS_SIZE, NavActor
 from vinl.policies.networks import PolicyNetwork
 
+_CRITIC = 256
+"""Width of the critic's layer."""
+
 
 class MemoryActor(Protocol):
     """What a ``PolicyNetwork`` needs to be trained with a critic beside it; see ``NavActor``, which has it."""
@@ -39,24 +42,25 @@ class Outlook(NamedTuple):
         mean: (t, n, a) of the actions.
         value: (t, n).
         state: the memory after the last step.
-        guess: (t, n, g) of what is hidden from the robots; g is 0 where nothing is to be guessed.
+        guess: (t, n, h) of what is hidden from the robots; h is 0 where nothing is.
     """
 
     mean: Float[Tensor, "t n a"]
     value: Float[Tensor, "t n"]
     state: State
-    guess: Float[Tensor, "t n g"]
+    guess: Float[Tensor, "t n h"]
 
 
 class RecurrentActorCritic(nn.Module):
-    """Shared trunk and heads: the actor's mean, the value, and guesses at what is hidden. The actions' spread does not
-    depend on the state.
+    """Shared trunk and heads: the actor's mean, the value, and guesses at what is hidden from the robots. The critic is
+    told what is hidden [Pinto et al. 2018]: what it knows is no policy's. The actions' spread does not depend on the
+    state.
 
     Args:
         actor: a ``MemoryActor``.
         log_std: logarithm of the actions' standard deviation at the start.
         log_std_range: it is held within these.
-        guesses: hidden numbers that the feature is to tell.
+        hidden: numbers that the critic is told, and that the feature is to tell.
     """
 
     _log_std_range: Tensor
@@ -66,21 +70,26 @@ class RecurrentActorCritic(nn.Module):
         actor: PolicyNetwork,
         log_std: float = -0.5,
         log_std_range: tuple[float, float] = (-2.0, 0.2),
-        guesses: int = 0,
+        hidden: int = 0,
     ) -> None:
         super().__init__()
         self.actor = actor
         self.log_std = nn.Parameter(torch.full((actor.action_size,), float(log_std)))
         self.register_buffer("_log_std_range", torch.tensor(log_std_range, dtype=torch.float32), persistent=False)
         width = cast(MemoryActor, actor).feature_size
-        value = nn.Linear(width, 1)
-        self.value = nn.Sequential(value)
-        self.guess = nn.Linear(width, guesses) if guesses else None
+        value = nn.Linear(_CRITIC, 1)
+        self.value = nn.Sequential(nn.Linear(width + hidden, _CRITIC), nn.ELU(), value)
+        self.guess = nn.Linear(width, hidden) if hidden else None
         nn.init.orthogonal_(value.weight)
         nn.init.zeros_(value.bias)
 
     def forward(
-        self, depth: Tensor | None, vector: Float[Tensor, "t n k"], state: State, fresh: Bool[Tensor, "t n"]
+        self,
+        depth: Tensor | None,
+        vector: Float[Tensor, "t n k"],
+        state: State,
+        fresh: Bool[Tensor, "t n"],
+        hidden: Float[Tensor, "t n h"] | None = None,
     ) -> Outlook:
         """What is made of t steps; images in [0, 1] or as bytes."""
         actor = cast(MemoryActor, self.actor)
@@ -89,7 +98,8 @@ class RecurrentActorCritic(nn.Module):
         feature = feature.float()
         with torch.autocast(feature.device.type, enabled=False):
             guess = feature[..., :0] if self.guess is None else self.guess(feature)
-            return Outlook(actor.choose(feature), self.value(feature)[..., 0], state, guess)
+            known = feature if hidden is None else torch.cat([feature, hidden], -1)
+            return Outlook(actor.choose(feature), self.value(known)[..., 0], state, guess)
 
     def actor_parameters(self) -> list[nn.Parameter]:
         """Those of the actor, the part shared with the critic included, and of its spread."""

@@ -18,6 +18,7 @@ from torch import Tensor, nn
 from vinl.config.errors import InputError
 from vinl.nav.compiled_vision import CompiledVision
 from vinl.nav.config import NavConfig
+from vinl.nav.environment import PATH_AHEAD
 from vinl.nav.learning_config import NavPpoConfig
 from vinl.nav.recurrent_model import Outlook, RecurrentActorCritic, RecurrentStorage
 from vinl.policies.nav_actor import NavActor
@@ -34,10 +35,11 @@ class RecurrentPPO:
     """Learns from roll-outs of a ``RecurrentActorCritic``.
 
     Observations are a ``TensorDict`` with ``vector`` (n, k), ``depth`` (n, H, W) in [0, 1] unless the actor is blind,
-    and ``hidden`` (n, g) if the feature is to tell it.
+    and ``hidden`` (n, h) if the critic is told something.
 
     Args:
         config: of the algorithm; the learning rate is ``rate``'s.
+        guess_weights: (h,) of the squared errors of the guesses at what is hidden; default: zeros.
     """
 
     def __init__(
@@ -47,6 +49,7 @@ class RecurrentPPO:
         rate: DeviceRate,
         config: NavPpoConfig,
         peers: Peers | None = None,
+        guess_weights: Tensor | None = None,
     ) -> None:
         if storage.robots % config.minibatches:
             raise InputError(f"num_envs {storage.robots} must be a multiple of ppo.minibatches {config.minibatches}")
@@ -56,6 +59,7 @@ class RecurrentPPO:
         self.peers.share(model)
         self.device = storage.vector.device
         on_gpu = self.device.type == "cuda"
+        self._guess_weights = None if guess_weights is None else guess_weights.to(self.device)
         self._bf16 = config.bf16 and on_gpu
         # one kernel for all weights; the rate lies on the device, so that no step waits for it
         self.optimizer = torch.optim.Adam(
@@ -94,7 +98,8 @@ class RecurrentPPO:
         depth = self._keep(observation, t)
         st.fresh[t] = self._fresh
         with torch.no_grad():
-            seen = self._look(depth, st.vector[t][None], self._state, self._fresh[None])
+            hidden = None if st.hidden is None else st.hidden[t][None]
+            seen = self._look(depth, st.vector[t][None], self._state, self._fresh[None], hidden)
         self._remember(seen.state)
         mean, noise = seen.mean[0], torch.randn_like(seen.mean[0])
         st.means[t], st.values[t] = mean, seen.value[0]
@@ -119,7 +124,8 @@ class RecurrentPPO:
         st, s = self.storage, self.config
         depth = st.as_stored(observation["depth"])[None] if st.depth is not None else None
         with torch.no_grad():
-            seen = self._look(depth, observation["vector"][None], self._state, self._fresh[None])
+            hidden = None if st.hidden is None else observation["hidden"][None]
+            seen = self._look(depth, observation["vector"][None], self._state, self._fresh[None], hidden)
         st.estimate_advantages(seen.value[0], s.gamma, s.lam)
         mean = st.advantages.mean()
         self.peers.average(mean)
@@ -194,18 +200,20 @@ class RecurrentPPO:
         for part, now in zip(self._state, state, strict=True):
             part.copy_(now)
 
-    def _look(self, depth: Tensor | None, vector: Tensor, state: tuple[Tensor, ...], fresh: Tensor) -> Outlook:
+    def _look(
+        self, depth: Tensor | None, vector: Tensor, state: tuple[Tensor, ...], fresh: Tensor, hidden: Tensor | None
+    ) -> Outlook:
         """What the model makes of t steps, in the precision of the training; see ``RecurrentActorCritic.forward``."""
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self._bf16):
             if self._compiled is not None and depth is not None:
                 self._compiled.check(depth)
-            return self.model(depth, vector, state, fresh)
+            return self.model(depth, vector, state, fresh, hidden)
 
     def _learn(self, robots: Tensor) -> None:
         """One step of the optimiser on all steps of some robots."""
         s, st, model = self.config, self.storage, self.model
         batch = st.take(robots)
-        mean, value, _, guess = self._look(batch.depth, batch.vector, batch.state, batch.fresh)
+        mean, value, _, guess = self._look(batch.depth, batch.vector, batch.state, batch.fresh, batch.hidden)
         log_std = model.log_std
         log_ratio = _log_prob(batch.actions, mean, log_std) - batch.log_prob
         ratio = log_ratio.exp()
@@ -215,8 +223,8 @@ class RecurrentPPO:
         value_loss = torch.max((value - batch.returns).square(), (near - batch.returns).square()).mean()
         entropy = (log_std + 0.5 * (1.0 + _LOG_2PI)).sum()
         guess_loss = torch.zeros_like(entropy)
-        if batch.hidden is not None:
-            guess_loss = ((guess - batch.hidden).square() * (s.places / guess.shape[-1])).sum(-1).mean()
+        if batch.hidden is not None and self._guess_weights is not None:
+            guess_loss = ((guess - batch.hidden).square() * self._guess_weights).sum(-1).mean()
         loss = surrogate + s.value * value_loss - self.entropy * entropy + guess_loss
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
@@ -235,9 +243,12 @@ class RecurrentPPO:
             self._sums += torch.stack([surrogate, value_loss, entropy, guess_loss, kl, clipped, norm])
 
 
-def count_guesses(config: NavPpoConfig) -> int:
-    """Hidden numbers that the feature is to tell: where the robot has been, if that has a weight."""
-    return VIEW**2 if config.places > 0 else 0
+def weigh_guesses(config: NavPpoConfig) -> Tensor:
+    """Weights of the errors of the guesses at what ``NavTrainingEnv`` hides: where the robot has been, if that is kept
+    track of, and where the shortest path leads."""
+    groups = [(config.places, VIEW**2)] if config.places > 0 else []
+    groups.append((config.paths, 2 * len(PATH_AHEAD) + 1))
+    return torch.cat([torch.full((size,), weight / size) for weight, size in groups])
 
 
 def build_storage(config: NavConfig, actor: NavActor, device: torch.device | str) -> RecurrentStorage:
@@ -251,7 +262,7 @@ def build_storage(config: NavConfig, actor: NavActor, device: torch.device | str
         actor.action_size,
         actor.initial_state(config.num_envs, device),
         device,
-        hidden=count_guesses(config.ppo),
+        hidden=len(weigh_guesses(config.ppo)),
     )
 
 
