@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from vinl.cli.train_loco import STAGES
-from vinl.config.errors import InputError
 from vinl.config.loader import build_config, dump_config, load_config
 from vinl.loco.config import LocoConfig, LocoPpoConfig
 from vinl.policies.io import list_policies, load_policy
@@ -69,8 +68,6 @@ def test_the_learning_rate_cools_to_its_last() -> None:
     assert [ppo.highest_rate(f) for f in (0.0, 0.59)] == [None, None]
     assert [ppo.highest_rate(f) for f in (0.6, 0.8, 1.0)] == pytest.approx([3e-4, 1.55e-4, 1e-5])
     assert LocoPpoConfig().highest_rate(1.0) is None
-    with pytest.raises(InputError, match=r"ppo\.cool_from"):
-        LocoPpoConfig(cool_from=0.5, update="rsl_rl")
 
 
 RECORD = ("origin", "lineage", "total_samples")

@@ -76,7 +76,7 @@ def test_resume_of_no_run_is_refused(tmp_path, capsys):
         (["--device", "tpu"], "tpu"),
         (["--devices", "0"], "--devices"),
         (["--devices", "3", "--num-envs", "8"], "--devices 3: num_envs"),
-        (["--devices", "2", "ppo.update=rsl_rl"], "ppo.update"),
+        (["ppo.update=rsl_rl"], "ppo.update"),
         (["--devices", "2", "--stage", "3", "--from", "teacher"], "stage 3 is trained on one device"),
     ],
 )

@@ -196,8 +196,8 @@ class LocoPpoConfig:
         critic_warmup: in so many first updates only the critic learns: one that starts afresh beside a trained actor
             would otherwise teach it nonsense.
         actor, critic: widths of the hidden layers; the critic sees the height scan too.
-        update: whose update: rsl_rl (rsl-rl's own), fast (the same numbers with fewer waits for the device; see
-            ``vinl.loco.fast_ppo``) or graphs (fast, its minibatches as CUDA graphs).
+        update: fast (rsl-rl's numbers with fewer waits for the device; see ``vinl.loco.fast_ppo``) or graphs (fast, its
+            minibatches as CUDA graphs).
     """
 
     steps: int = 24
@@ -217,14 +217,12 @@ class LocoPpoConfig:
     critic_warmup: int = 0
     actor: tuple[int, ...] = (512, 256, 128)
     critic: tuple[int, ...] = (512, 256, 128)
-    update: Literal["rsl_rl", "fast", "graphs"] = "graphs"
+    update: Literal["fast", "graphs"] = "graphs"
 
     def __post_init__(self) -> None:
         rates = ("learning_rate", "desired_kl", "cool_rates", "init_std", "gamma")
         counts, fractions = ("steps", "epochs", "minibatches"), ("cool_from", "gamma", "lam")
         check_fields(self, "ppo.", counts=counts, unsigned=("critic_warmup",), positive=rates, fractions=fractions)
-        if self.cool_from < 1 and self.update == "rsl_rl":
-            raise InputError("ppo.cool_from: rsl-rl's own update knows no limit; choose update fast or graphs")
 
     def highest_rate(self, fraction: float) -> float | None:
         """The limit of the learning rate after a fraction of the iterations; None: there is none."""
@@ -322,8 +320,6 @@ class LocoConfig:
             return self
         if self.stage == 3:
             raise InputError(f"--devices {count}: stage 3 is trained on one device; leave --devices out")
-        if self.ppo.update == "rsl_rl":
-            raise InputError(f"--devices {count}: ppo.update rsl_rl knows one device; choose fast or graphs")
         if self.num_envs % count:
             raise InputError(f"--devices {count}: num_envs must be a multiple of it, got {self.num_envs}")
         return replace(self, num_envs=self.num_envs // count, seed=self.seed + rank)

@@ -30,9 +30,6 @@ WARMUP_RATE = 1e-3
 def rsl_rl_settings(config: LocoConfig, peers: Peers | None = None) -> dict[str, Any]:
     """Our PPO settings under rsl-rl's names."""
     p = config.ppo
-    update: dict[str, Any] = {"class_name": "PPO"}
-    if p.update != "rsl_rl":
-        update = {"class_name": "vinl.loco.fast_ppo:FastPPO", "graphs": p.update == "graphs", "peers": peers}
     return {
         "num_steps_per_env": p.steps,
         "obs_groups": {"actor": ["policy"], "critic": ["critic"]},
@@ -45,7 +42,9 @@ def rsl_rl_settings(config: LocoConfig, peers: Peers | None = None) -> dict[str,
         },
         "critic": {"class_name": "MLPModel", "hidden_dims": list(p.critic), "activation": "elu"},
         "algorithm": {
-            **update,
+            "class_name": "vinl.loco.fast_ppo:FastPPO",
+            "graphs": p.update == "graphs",
+            "peers": peers,
             "num_learning_epochs": p.epochs,
             "num_mini_batches": p.minibatches,
             "learning_rate": p.learning_rate,

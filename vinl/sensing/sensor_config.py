@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vinl.config.limits import Range, check_number, check_range
+from vinl.config.limits import Range, check_limits
 from vinl.config.loader import load_config
 
 _LIMITS = {
@@ -16,10 +16,6 @@ _LIMITS = {
     "edge_step": (0.01, 10.0),
     "surfaces": (0.0, 1.0),
     "surface_size": (0.05, 10.0),
-}
-"""Limits of the single numbers of ``SensorConfig``."""
-
-_RANGES = {
     "patch_size": (0.01, 1.0),
     "range": (0.0, 1000.0),
     "delay": (0.0, 0.4),
@@ -28,7 +24,7 @@ _RANGES = {
     "height": (-0.2, 0.2),
     "amplitude": (0.0, 10.0),
 }
-"""Limits of its ranges. A delay stays below the 0.5 s between two decisions."""
+"""Of ``SensorConfig``. A delay stays below the 0.5 s between two decisions."""
 
 
 @dataclass(frozen=True)
@@ -75,10 +71,7 @@ class SensorConfig:
     amplitude: Range = (1.0, 1.0)
 
     def __post_init__(self) -> None:
-        for name, limits in _LIMITS.items():
-            check_number(f"sensors.{name}", getattr(self, name), *limits)
-        for name, limits in _RANGES.items():
-            check_range(f"sensors.{name}", getattr(self, name), *limits)
+        check_limits(self, "sensors.", **_LIMITS)
 
     @property
     def is_ideal(self) -> bool:
@@ -118,8 +111,7 @@ class OdometryConfig:
     yaw_bias: float = 0.1
 
     def __post_init__(self) -> None:
-        check_range("odometry.drift", self.drift, 0.0, 0.5)
-        check_number("odometry.yaw_bias", self.yaw_bias, 0.0, 1.0)
+        check_limits(self, "odometry.", drift=(0.0, 0.5), yaw_bias=(0.0, 1.0))
 
     @property
     def is_exact(self) -> bool:

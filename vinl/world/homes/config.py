@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from vinl.config.errors import InputError
-from vinl.config.limits import Range, check_number, check_range
+from vinl.config.limits import Range, check_limits
 
 RANGES = {
     "area": (30.0, 1000.0),
@@ -72,11 +72,7 @@ class HomeConfig:
     def __post_init__(self) -> None:
         if self.layout not in LAYOUTS:
             raise InputError(f"homes: layout must be one of {', '.join(LAYOUTS)}, got {self.layout!r}")
-        for name, (least, most) in RANGES.items():
-            check_range(f"homes: {name}", getattr(self, name), least, most)
-        for name in vars(self):
-            if name.endswith("_share"):
-                check_number(f"homes: {name}", getattr(self, name), 0.0, 1.0)
+        check_limits(self, "homes: ", **RANGES, **{name: (0.0, 1.0) for name in vars(self) if name.endswith("_share")})
         if self.area[1] < 1.05 * self.area[0]:
             raise InputError(f"homes: area needs some room between least and most, got {self.area}")
         if self.door_height[1] > self.wall_height[0]:
