@@ -22,10 +22,11 @@ from vinl.chain.records import plain_record
 from vinl.config.errors import InputError
 from vinl.config.loader import load_config
 from vinl.gait.observation import insert_gait
-from vinl.gym.home import JOINT_REACH, RANGE, HomeEnv
+from vinl.gym.home import JOINT_REACH, HomeEnv
 from vinl.nav.config import NavConfig
 from vinl.policies.card import find_gait, navigation_table
 from vinl.policies.policy import LocomotionPolicy
+from vinl.policies.velocity_range import VelocityRange
 from vinl.robot.aliengo import ACTION_SCALE
 from vinl.robot.observation import observe
 from vinl.world.boxes import Blocks
@@ -34,6 +35,8 @@ pytestmark = pytest.mark.slow
 
 ID, PLAN = "vinl/Home-v0", "harbour_flat"
 NEAR = EvaluationConfig(min_distance=2.0)
+RANGE = VelocityRange((0.0, 0.8))
+"""Of an action, as in training: configs/nav/default.yaml."""
 
 
 class StepwiseOracle(OracleNavigator):
@@ -101,7 +104,7 @@ def test_oracle_walks_the_episode_that_evaluate_walks() -> None:
     env = HomeEnv(floorplans=plan, locomotor="teacher", rules=NEAR, overrides=["reward.scale=1.0"])
     _, info = env.reset(seed=0, options={"episode": 0, "seed": 2})
     oracle, rewards, over, out = OracleNavigator(NEAR.oracle), [], False, False
-    assert env.trip is not None
+    assert env.trip is not None and env.velocity_range.forward_speed == RANGE.forward_speed
     began = info["geodesic_m"]
     oracle.reset([env.trip.task])
     while not (over or out):

@@ -93,7 +93,7 @@ def check_locomotion_policy(policy: Policy) -> None:
     """
     card = policy.card
     if card.kind != "locomotion":
-        raise InputError(f"{card.name} is a {card.kind} policy; a locomotor (--loco, --policy) is a locomotion policy")
+        raise InputError(f"{card.name} is a {card.kind} policy; give a locomotion policy (--loco, --policy)")
     wanted = locomotion_table(find_gait(card) is not None).size
     if card.observation_size not in (SENSED_TABLE.size, wanted):
         raise InputError(

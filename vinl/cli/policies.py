@@ -43,7 +43,7 @@ def main(argv: list[str]) -> int:
         return 0
     console = Console()
     if options.name is not None:
-        _print_card(console, cards[0])
+        _print_card(console, cards[0], options.name)
     elif not cards:
         console.print("no policy is shipped with this version; train one: vinl train-loco --stage 1")
     else:
@@ -88,7 +88,7 @@ def _print_table(console: Console, cards: list[PolicyCard]) -> None:
     )
 
 
-def _print_card(console: Console, card: PolicyCard) -> None:
+def _print_card(console: Console, card: PolicyCard, name: str) -> None:
     """One screen; the whole is in the JSON."""
     from rich import box
     from rich.table import Table
@@ -114,7 +114,7 @@ def _print_card(console: Console, card: PolicyCard) -> None:
     for key, value in rows.items():
         table.add_row(Text(key), Text(str(value)))
     console.print(table)
-    console.print(f"the whole card: vinl policies {card.name} --json; vinl.load_policy({card.name!r})", soft_wrap=True)
+    console.print(f"the whole card: vinl policies {name} --json; vinl.load_policy({name!r})", soft_wrap=True)
 
 
 _UNITS = {

@@ -58,16 +58,15 @@ def check_action(action: np.ndarray, size: int) -> Float[np.ndarray, " n"]:
 
 Plans = str | Path | FloorPlan | Sequence[str | Path | FloorPlan]
 CONTROLS = ("velocity", "joints")
-RANGE = VelocityRange()
 
 
 class HomeEnv(gymnasium.Env):
     """One robot in homes with clutter. The agent is its navigator, or its legs.
 
-    ``control="velocity"``: an action (2,) in [-1, 1] is a forward speed of 0 to 1 m/s and a yaw rate of +-60 deg/s that
-    a locomotor carries out for 0.5 s. Observed are ``vector``, distance / 5 m, cosine and sine of the goal's bearing
-    and the last step (by ``previous`` in the config the action, how the robot moved in units of the action, or both),
-    and ``depth`` of the navigation camera: what ``vinl/Nav-v0`` has.
+    ``control="velocity"``: an action (2,) in [-1, 1] is a forward speed and a yaw rate within the limits of ``config``
+    (0 to 0.8 m/s, +-60 deg/s) that a locomotor carries out for 0.5 s. Observed are ``vector``, distance / 5 m, cosine
+    and sine of the goal's bearing and the last step (by ``previous`` in the config the action, how the robot moved in
+    units of the action, or both), and ``depth`` of the navigation camera: what ``vinl/Nav-v0`` has.
 
     ``control="joints"``: an action (12,) in [-1, 1] x ``joint_reach`` rad is where the joints shall be relative to the
     default pose, for 0.02 s. Observed are ``goal`` (3,), as above, ``proprioception`` (48,), what a robot
@@ -93,12 +92,13 @@ class HomeEnv(gymnasium.Env):
         cameras: name of the image -> ``"navigation"``, ``"locomotion"`` or a camera record; see above for the default.
         height_scan: also observe ``height_scan`` (187,), the ground around the robot: privileged.
         joint_reach: see above [rad].
-        config: the navigator's config, name or file: camera, reward and ``previous`` are taken.
+        config: the navigator's config, name or file: camera, reward, speeds and ``previous`` are taken.
         overrides: settings of that config as ``key=value``.
         rules: limits of an episode.
 
     Attributes:
         trip: the episode under way.
+        velocity_range: what actions of a navigator mean.
 
     Raises:
         InputError: a name is unknown, or options do not go together.
@@ -131,7 +131,9 @@ class HomeEnv(gymnasium.Env):
         self._rules = rules if isinstance(rules, EvaluationConfig) else load_config(EvaluationConfig, rules)
         navigation = load_config(NavConfig, config, overrides)
         self._reward, self._clutter = navigation.reward, choose_clutter(obstacles, "obstacles")
-        self._knows = navigation.previous
+        self._knows, robot = navigation.previous, navigation.robot
+        limits = (robot.min_speed, robot.max_speed), (-robot.max_yaw_rate, robot.max_yaw_rate)
+        self.velocity_range = VelocityRange(*limits)
         self._spaces = [FreeSpace(plan) for plan in _load_plans(floorplans)]
         self._legs = self._guide = None
         if self._joints:
@@ -236,14 +238,15 @@ class HomeEnv(gymnasium.Env):
         """Have the locomotor carry out a velocity. True if a wall was touched."""
         assert self._legs is not None
         before, began, touched = trip.pose, trip.steps, False
-        self._command[0, ::2] = RANGE.velocity(action)
+        self._command[0, ::2] = self.velocity_range.velocity(action)
         for _ in range(self._rules.navigation_period):
             trip.advance(self._legs.choose(trip, self._command), self._command)
             touched = touched or trip.touched_wall
             if trip.end:
                 break
         twist = measure_twist(before, trip.pose, (trip.steps - began) * CONTROL_DT)[:, [0, 2]]
-        known = {"action": [action[None]], "motion": [RANGE.action(twist)], "both": [action[None], RANGE.action(twist)]}
+        motion = self.velocity_range.action(twist)
+        known = {"action": [action[None]], "motion": [motion], "both": [action[None], motion]}
         self._previous = np.concatenate(known[self._knows], 1)
         return touched
 

@@ -63,6 +63,11 @@ def load_warm_start(name_or_path: str, config: LocoConfig) -> WarmStart:
     """
     policy = load_policy(name_or_path)
     network = policy.network
+    if not isinstance(network, StepActor):
+        raise InputError(
+            f"--from {name_or_path}: a {policy.card.kind} policy with a {type(network).__name__}; give one of stage 1 "
+            "or 2, which have a StepActor"
+        )
     # the gait is looked at by itself: one without a map has the same weights
     given, wanted = (_without_gait(x) for x in (network, StepActor(actor=config.ppo.actor)))
     if given != wanted:
