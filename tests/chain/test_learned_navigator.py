@@ -124,7 +124,7 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert {name: row["name"] for name, row in policies.items()} == {"locomotion": "walker", "navigation": "guide"}
     capsys.readouterr()
     for given, words in (
-        ("--loco ./nav", "guide is a navigation policy; a locomotor"),
+        ("--loco ./nav", "guide is a navigation policy; give a locomotion policy"),
         ("--nav ./loco", "walker is a locomotion policy; a navigator"),
         ("--nav rough", "rough is a locomotion policy; a navigator"),
         ("--nav orcale", "unknown navigator 'orcale', did you mean 'oracle'"),
