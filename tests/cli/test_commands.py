@@ -1,6 +1,8 @@
 """vinl policies, vinl doctor, vinl bench: what they print, and what they say to bad input."""
 
 import json
+import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,7 @@ from vinl.cli import doctor
 from vinl.cli.app import main
 from vinl.cli.policies import count
 from vinl.policies.card import locomotion_card
-from vinl.policies.io import WEIGHTS_FILE, save_policy
+from vinl.policies.io import WEIGHTS_FILE, find_policy, save_policy
 from vinl.policies.networks import StepActor
 
 
@@ -42,6 +44,14 @@ def test_one_card(shipped: Path, capsys: pytest.CaptureFixture[str]):
     assert "foothold (8)" in said and "action scale [rad]" in said and "StepActor" in said
     assert main(["policies", str(shipped), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["samples"] == 128_000_000
+
+
+def test_the_command_under_a_card_works_for_a_folder_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    folder = shutil.copytree(find_policy("nav"), tmp_path / "mine")  # a card with figures of several evaluations
+    assert main(["policies", str(folder)]) == 0
+    command = re.search(r"the whole card: vinl (.+?);", capsys.readouterr().out)
+    assert command is not None and main(command[1].split()) == 0
+    assert json.loads(capsys.readouterr().out)["kind"] == "navigation"
 
 
 def test_no_policy_says_how_to_get_one(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):

@@ -131,6 +131,11 @@ def test_either_goes_on_from_the_others_state():
     assert crossed_slow.learning_rate == pytest.approx(crossed_fast.learning_rate, rel=1e-4)
 
 
+def test_what_it_does_not_know_is_refused():
+    with pytest.raises(ValueError, match="mixed precision"):
+        build("vinl.loco.fast_ppo:FastPPO", NoiseEnv(), use_mixed_precision=True)
+
+
 def test_actions_are_drawn_as_rsl_rl_draws_them():
     mean, drawn = torch.randn(500, 12), []
     for kind in (GaussianDistribution, UncheckedGaussian):

@@ -88,8 +88,8 @@ def _print_table(console: Console, cards: list[PolicyCard]) -> None:
     )
 
 
-def _print_card(console: Console, card: PolicyCard, name: str) -> None:
-    """One screen; the whole is in the JSON."""
+def _print_card(console: Console, card: PolicyCard, given: str) -> None:
+    """One screen; the whole is in the JSON, by the name or folder that was given."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -114,7 +114,7 @@ def _print_card(console: Console, card: PolicyCard, name: str) -> None:
     for key, value in rows.items():
         table.add_row(Text(key), Text(str(value)))
     console.print(table)
-    console.print(f"the whole card: vinl policies {name} --json; vinl.load_policy({name!r})", soft_wrap=True)
+    console.print(f"the whole card: vinl policies {given} --json; vinl.load_policy({given!r})", soft_wrap=True)
 
 
 _UNITS = {

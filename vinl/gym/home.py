@@ -24,7 +24,6 @@ from vinl.gym.trip import ChaseView, Guide, Legs, Trip
 from vinl.nav.config import NavConfig
 from vinl.policies.card import navigation_table
 from vinl.policies.policy import Policy
-from vinl.policies.velocity_range import VelocityRange
 from vinl.robot.aliengo import ACTION_SCALE, CONTROL_DT, DEFAULT_POSE
 from vinl.world.clutter import choose_clutter
 from vinl.world.floorplan import FloorPlan
@@ -131,9 +130,7 @@ class HomeEnv(gymnasium.Env):
         self._rules = rules if isinstance(rules, EvaluationConfig) else load_config(EvaluationConfig, rules)
         navigation = load_config(NavConfig, config, overrides)
         self._reward, self._clutter = navigation.reward, choose_clutter(obstacles, "obstacles")
-        self._knows, robot = navigation.previous, navigation.robot
-        limits = (robot.min_speed, robot.max_speed), (-robot.max_yaw_rate, robot.max_yaw_rate)
-        self.velocity_range = VelocityRange(*limits)
+        self._knows, self.velocity_range = navigation.previous, navigation.robot.velocity_range
         self._spaces = [FreeSpace(plan) for plan in _load_plans(floorplans)]
         self._legs = self._guide = None
         if self._joints:

@@ -26,14 +26,16 @@ _LOSSES = ("value", "surrogate", "entropy")
 
 
 class FastPPO(PPO):
-    """For feed-forward actors and critics, without rsl-rl's random network distillation, symmetry and mixed precision.
-    The numbers are rsl-rl's up to rounding.
+    """For feed-forward actors and critics. The numbers are rsl-rl's up to rounding.
 
     Args:
         arguments, rest: as for rsl-rl's ``PPO``.
         graphs: minibatches as a CUDA graph, where there is one process.
         peers: processes that learn one policy, each from as many robots of its own; their numbers are those of one
             process that has all robots. None: this is the only one.
+
+    Raises:
+        ValueError: a setting that only rsl-rl's own update knows.
     """
 
     def __init__(self, *arguments: Any, graphs: bool = False, peers: Peers | None = None, **rest: Any) -> None:
@@ -41,6 +43,13 @@ class FastPPO(PPO):
         self.peers = peers or Peers()
         for model in (self.actor, self.critic):
             self.peers.share(model)
+        other = {"rnd": self.rnd, "symmetry": self.symmetry, "mixed precision": self.use_mixed_precision}
+        other["several GPUs"] = self.is_multi_gpu
+        unknown = [name for name, setting in other.items() if setting]
+        if self.actor.is_recurrent or self.critic.is_recurrent:
+            unknown.append("recurrent networks")
+        if unknown:
+            raise ValueError(f"FastPPO does not know {', '.join(unknown)}; use rsl-rl's PPO")
         self._on_gpu = torch.device(self.device).type == "cuda"
         self.rate = DeviceRate(self._first_rate, _LOWEST, _HIGHEST, self.desired_kl, 1.5, 1.5, self.device)
         self.optimizer = torch.optim.Adam(

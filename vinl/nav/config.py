@@ -10,6 +10,7 @@ from vinl.config.errors import InputError
 from vinl.config.limits import Range, check_fields, check_limits, check_number
 from vinl.nav.learning_config import NavNetworkConfig, NavPpoConfig
 from vinl.policies.card import PREVIOUS
+from vinl.policies.velocity_range import VelocityRange
 from vinl.robot.cameras import NAVIGATION_CAMERA, Camera
 from vinl.sensing.sensor_config import OdometryConfig, SensorConfig
 from vinl.world.homes.config import HomeConfig, layout_config
@@ -42,6 +43,11 @@ class RobotConfig:
         check_limits(self, "robot.", **positive, min_speed=(-10.0, 0.0))
         if self.width > self.length:
             raise InputError("robot.width must not exceed robot.length")
+
+    @property
+    def velocity_range(self) -> VelocityRange:
+        """What actions mean."""
+        return VelocityRange((self.min_speed, self.max_speed), (-self.max_yaw_rate, self.max_yaw_rate))
 
 
 @dataclass(frozen=True)

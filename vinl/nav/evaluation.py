@@ -177,8 +177,7 @@ def _open_policy(policy: DepthPolicy, environment: NavEnvironment) -> Callable[[
 
 def _open_oracle(tasks: list[Task], kept: list[int], environment: NavEnvironment) -> Callable[[Tensor], Tensor]:
     """The path follower of ``vinl eval`` for the robots that have a path; the others stay where they are."""
-    robot = environment.config.robot
-    span = VelocityRange((robot.min_speed, robot.max_speed), (-robot.max_yaw_rate, robot.max_yaw_rate))
+    span = environment.config.robot.velocity_range
     oracle, pose = OracleNavigator(), np.zeros((len(kept), 3))
     oracle.reset([tasks[k] for k in kept])
 

@@ -105,8 +105,7 @@ class Viewer:
         self.shown: Snapshot | None = None
         self.error: BaseException | None = None
         self._server = open_server(host, port, title)
-        names = {"127.0.0.1": "localhost", "0.0.0.0": socket.gethostname()}  # what other machines know this one as
-        shown = names.get(host, host)
+        shown = "localhost" if host in ("0.0.0.0", "127.0.0.1") else host
         self.url = f"http://{shown}:{self._server.get_port()}"
         gui = self._server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
