@@ -1,29 +1,34 @@
 #!/usr/bin/env bash
-# Trains the locomotion policies from nothing, in order; each is one YAML file in configs/loco and one command.
+# Trains all policies from nothing, in order; each is one YAML file in configs/loco or configs/nav and one command.
 #
 #   scripts/reproduce.sh [DEVICE]     DEVICE: cuda (default) or cpu
 #
 # RUNS is where the runs go (default: runs). A run that is there already is gone on with; one that is complete is left.
 # Beside each: samples, and the minutes that they take at the speeds that the project holds itself to on one H200
-# (stages 1 and 2: 260,000 samples/s; stage 3: 70,000). Measured last: 247,000 and 287,000 on an H100, 75,700 on an H200.
+# (stages 1 and 2: 260,000 samples/s; stage 3: 70,000). Measured last: 247,000 and 287,000 on an H100, 75,700 on an H200;
+# navigation 57,000 on an H100.
 set -euo pipefail
 device="${1:-cuda}"
 runs="${RUNS:-runs}"
 
-train() {  # name, then what a new run is started with
-  local name="$1"; shift
+train() {  # loco or nav, name, then what a new run is started with
+  local command="train-$1" name="$2"; shift 2
   if [ -d "$runs/$name" ]; then
-    vinl train-loco --resume "$runs/$name" --device "$device"
+    vinl "$command" --resume "$runs/$name" --device "$device"
   else
-    vinl train-loco "$@" --device "$device" --out "$runs/$name"
+    vinl "$command" "$@" --device "$device" --out "$runs/$name"
   fi
 }
 
-train rough --stage 1                                                          #  39 M   2.5 min
-train teacher --stage 2 --from "$runs/rough"                                   # 295 M  18.9 min
-train student --stage 3 --from "$runs/teacher"                                 #  15 M   3.5 min
+train loco rough --stage 1                                                     #  39 M   2.5 min
+train loco teacher --stage 2 --from "$runs/rough"                              # 295 M  18.9 min
+train loco student --stage 3 --from "$runs/teacher"                            #  15 M   3.5 min
 
 # baselines [paper IV-B]: the same samples in each stage
-train blind --config loco/blind --from "$runs/rough"                           # 295 M  18.9 min
-train no_pretraining --config loco/no_pretraining                              # 295 M  18.9 min
-train mlp --config loco/mlp --from "$runs/teacher"                             #  15 M   3.5 min
+train loco blind --config loco/blind --from "$runs/rough"                      # 295 M  18.9 min
+train loco no_pretraining --config loco/no_pretraining                         # 295 M  18.9 min
+train loco mlp --config loco/mlp --from "$runs/teacher"                        #  15 M   3.5 min
+
+# navigation, and what it is held against
+train nav nav --iterations 1618                                                # 159 M  46.5 min
+train nav nav-blind --config nav/blind --iterations 1000                       #  98 M   9.0 min

@@ -43,7 +43,7 @@ def test_rows_of_the_table_differ_by_what_their_names_say() -> None:
 
 
 def test_the_script_trains_every_config_in_order_and_says_for_how_long() -> None:
-    commands = re.findall(r"^train (\w+) (.*?)  +# +(\d+) M +([\d.]+) min$", SCRIPT, re.MULTILINE)
+    commands = re.findall(r"^train loco (\w+) (.*?)  +# +(\d+) M +([\d.]+) min$", SCRIPT, re.MULTILINE)
     assert [name for name, *_ in commands] == ["rough", "teacher", "student", "blind", "no_pretraining", "mlp"]
     assert sorted(name for name, *_ in commands) == CONFIGS
     trained: set[str] = set()

@@ -1,0 +1,42 @@
+"""One command per policy: a card's training is its YAML."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from vinl.config.loader import dump_config, load_config
+from vinl.nav.config import NavConfig
+from vinl.policies.io import load_policy
+
+SAME_POLICY = {"ppo.compiled"}
+"""How fast a training computes, and not what."""
+
+
+def flatten(settings: dict, prefix: str = "") -> dict:
+    flat = {}
+    for key, value in settings.items():
+        flat |= flatten(value, f"{prefix}{key}.") if isinstance(value, dict) and value else {f"{prefix}{key}": value}
+    return flat
+
+
+@pytest.mark.parametrize(("name", "config"), [("nav", "nav/default"), ("nav-blind", "nav/blind")])
+def test_the_training_of_every_shipped_card_is_its_yaml(name: str, config: str) -> None:
+    """What a card does not name was not there when it was trained, and is neutral."""
+    card, neutral = flatten(load_policy(name).card.training), flatten(dump_config(NavConfig()))
+    for key, value in flatten(dump_config(load_config(NavConfig, config))).items():
+        if key not in SAME_POLICY:
+            assert card.get(key, neutral.get(key)) == value, key
+
+
+def test_the_script_trains_them_on_one_gpu_with_as_many_samples() -> None:
+    script = (Path(__file__).resolve().parents[2] / "scripts" / "reproduce.sh").read_text()
+    commands = re.findall(r"^train nav (\S+) (.*?)  +# +(\d+) M", script, re.MULTILINE)
+    assert [name for name, *_ in commands] == ["nav", "nav-blind"]
+    for name, options, millions in commands:
+        config = re.search(r"--config (\S+)", options)
+        loaded = load_config(NavConfig, config.group(1) if config else "nav/default")
+        iterations = int(re.search(r"--iterations (\d+)", options).group(1))
+        samples = loaded.num_envs * iterations * loaded.ppo.steps
+        assert round(samples / 1e6) == int(millions)
+        assert load_policy(name).card.training["total_samples"] == pytest.approx(samples, rel=0.04)
