@@ -83,6 +83,7 @@ MISTAKES = {
     "train-loco --config nav/default": "use vinl train-nav --config nav/default",
     "train-nav --config loco/rough": "use vinl train-loco --config loco/rough",
     "train-loco --stage 2 --from vinl/nav": "nav is a navigation policy: use vinl train-nav",
+    "train-loco --stage 2 --resume runs/rough": "--resume goes on with the run's own stage",
     "train-nav --from loco": "loco is a locomotion policy: use vinl train-loco",
     "train-loco --out /proc/foo": "nothing can be written there",
     "train-nav --out /proc/foo": "nothing can be written there",

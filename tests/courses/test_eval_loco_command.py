@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from vinl.cli.app import main
+from vinl.config.output import choose_out, write_json
 from vinl.policies.io import save_policy
 from vinl.policies.policy import LocomotionPolicy
 
@@ -37,6 +38,16 @@ def test_bars_write_the_names_that_others_read(policies: list[str], capsys: pyte
     assert data["config"]["depth"] == 0.2 and data["config"]["speed"] == 0.5
     said = capsys.readouterr().out
     assert "standing" in said and "no foot" in said and "results.json" in said
+    assert main(command.replace("0.1", "0.15").split()) == 2  # what another command found stays
+    assert f"holds the results of 'vinl eval-loco --policy {policies[0]}" in capsys.readouterr().err
+    assert json.loads(Path("bars/results.json").read_text()) == data
+
+
+def test_results_of_another_command_stay_where_they_are() -> None:
+    folder = Path("runs/eval-loco-loco")
+    write_json(folder / "results.json", {"command": ["vinl", "eval-loco"]})
+    assert choose_out(None, folder, ["vinl", "eval-loco"]) == folder
+    assert choose_out(None, folder, ["vinl", "eval-loco", "--seed", "1"]) == Path("runs/eval-loco-loco-2")
 
 
 def test_policies_are_compared_over_bars_and_filmed(policies: list[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -46,7 +46,7 @@ def untrained(tmp_path):
 
 
 def results(tmp_path, *more: str) -> dict:
-    out = tmp_path / "out"
+    out = tmp_path / f"out-{len(list(tmp_path.glob('out-*')))}"
     assert main(["eval-nav", "--floorplans", "harbour_flat", "--episodes", "6", "--out", str(out), *more]) == 0
     assert (out / "report.html").read_text().count("<svg") >= 7
     return json.loads((out / "results.json").read_text())

@@ -23,7 +23,7 @@ class Options:
 
     out: str | None = None
     """Folder for results.json, contacts.png (on blocks) and what --video films (default: runs/eval-loco- and the
-    policies)."""
+    policies, numbered)."""
     policy: str | None = None
     """A shipped policy's name, or a policy folder or training run (default: loco)."""
     compare: tuple[str, ...] = ()
@@ -69,7 +69,7 @@ def main(argv: list[str]) -> int:
     options = parse_options(Options, argv, "eval-loco")
     from vinl.chain.choose import best_locomotor
     from vinl.config.loader import closest
-    from vinl.config.output import check_out, strip_command
+    from vinl.config.output import choose_out, strip_command
     from vinl.courses.grounds import TERRAINS
 
     if options.policy is not None and options.compare:
@@ -86,8 +86,9 @@ def main(argv: list[str]) -> int:
         if getattr(options, name) is not None and getattr(options, name) is not False:
             where = "is not for --terrain bars" if name in _COURSES else "is for --terrain bars alone"
             raise InputError(f"--{name} {where}")
-    out = check_out(default_out("eval-loco", *names[:3]) if options.out is None else options.out)
-    _run(options, names, out, ["vinl", "eval-loco", *strip_command(argv)])
+    command = ["vinl", "eval-loco", *strip_command(argv)]
+    out = choose_out(options.out, default_out("eval-loco", *names[:3]), command)
+    _run(options, names, out, command)
     return 0
 
 

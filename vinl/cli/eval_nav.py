@@ -17,7 +17,7 @@ class Options:
     policy: str = "nav"
     """A shipped navigation policy's name, the folder of a policy or run, or oracle: the path follower of vinl eval."""
     out: str | None = None
-    """Folder for results.json and report.html (default: runs/eval-nav- and the policy)."""
+    """Folder for results.json and report.html (default: runs/eval-nav- and the policy, numbered)."""
     floorplans: tuple[str, ...] = ()
     """Floor plans beside the generated homes; FILE:50-99 are plans 50 to 99 of a JSON file, FILE:50- those from 50 on,
     FILE:0-/2 every second."""
@@ -60,7 +60,7 @@ def main(argv: list[str]) -> int:
     options = parse_options(Options, argv, "eval-nav")
     from rich.console import Console
 
-    from vinl.config.output import SCHEMA, check_out, describe_environment, strip_command, write_json, write_text
+    from vinl.config.output import SCHEMA, choose_out, describe_environment, strip_command, write_json, write_text
     from vinl.nav.environment import STUCK_STEPS
     from vinl.nav.evaluation import (
         NavEvaluation,
@@ -80,7 +80,8 @@ def main(argv: list[str]) -> int:
     )
     from vinl.policies.device import choose_device
 
-    out = check_out(default_out("eval-nav", options.policy) if options.out is None else options.out)
+    command = ["vinl", "eval-nav", *strip_command(argv)]
+    out = choose_out(options.out, default_out("eval-nav", options.policy), command)
     homes = (0 if options.floorplans or options.sets else 200) if options.homes is None else options.homes
     if homes < 0:
         raise InputError(f"--homes must not be negative, got {homes}")
@@ -123,7 +124,7 @@ def main(argv: list[str]) -> int:
         raise InputError("no home has a start and a goal as far apart as asked for; lower --min-distance")
     data = {
         "schema": SCHEMA,
-        "command": ["vinl", "eval-nav", *strip_command(argv)],
+        "command": command,
         "config": {
             **asdict(rules),
             "homes": homes,

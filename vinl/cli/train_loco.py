@@ -26,13 +26,21 @@ class Options(TrainingOptions):
 
     config: str | None = None
     """Name of a shipped config or a YAML file; default: the stage's own."""
-    stage: int = 1
-    """1: walk on rough ground. 2: step over blocks, to footholds that are chosen on a map. 3: the same with a depth
-    camera in place of the map; learns from a policy of stage 2."""
+    stage: int | None = None
+    """1: walk on rough ground (default). 2: step over blocks, to footholds that are chosen on a map. 3: the same with a
+    depth camera in place of the map; learns from a policy of stage 2."""
     num_envs: int | None = None
     """Robots in parallel, on all devices together (default: the config's)."""
     devices: int = 1
     """GPUs of this machine that share the robots of stage 1 or 2 (on a CPU: processes)."""
+
+    def check(self) -> None:
+        """Refuse stages that do not exist too, and one beside --resume."""
+        if self.stage not in (None, *STAGES):
+            raise InputError(f"--stage {self.stage} does not exist; choose {', '.join(map(str, STAGES))}")
+        if self.resume and self.stage is not None:
+            raise InputError("--resume goes on with the run's own stage; leave --stage out")
+        super().check()
 
 
 STAGES = {1: "loco/rough", 2: "loco/teacher", 3: "loco/student"}
@@ -41,8 +49,6 @@ STAGES = {1: "loco/rough", 2: "loco/teacher", 3: "loco/student"}
 def main(argv: list[str]) -> int:
     """Run the command; returns 130 after an interrupt, 1 where numbers were not finite."""
     options = parse_options(Options, settings_first(Options, argv), "train-loco")
-    if options.stage not in STAGES:
-        raise InputError(f"--stage {options.stage} does not exist; choose {', '.join(map(str, STAGES))}")
     options.check()
     if is_started():
         _see_one_gpu()
@@ -56,10 +62,10 @@ def main(argv: list[str]) -> int:
     from vinl.rl.machine import explain_out_of_memory
     from vinl.rl.nan_guard import NotFiniteError
 
-    source = options.config or STAGES[options.stage]
+    source = options.config or STAGES[options.stage or 1]
     folder, config, num_envs = options.open_run(LocoConfig, "locomotion", source)
     if config is not None:
-        if options.stage not in (1, config.stage):
+        if options.stage not in (None, config.stage):
             raise InputError(f"--stage {options.stage}: {source} is a config of stage {config.stage}")
         config = replace(config, from_policy=options.from_policy or config.from_policy)
     if not is_started():

@@ -7,6 +7,7 @@ import json
 import numbers
 import os
 import platform
+import shlex
 import tempfile
 from collections.abc import Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -57,6 +58,33 @@ def check_out(out: str | Path) -> Path:
             f"--out {out}: nothing can be written there ({error.strerror}); choose another folder"
         ) from None
     return out
+
+
+def choose_out(given: str | None, default: Path, command: Sequence[str]) -> Path:
+    """The folder for the results of a command: the one given, or the first of ``default``, ``default-2`` and so on that
+    does not hold those of another.
+
+    Raises:
+        InputError: the one given does, or nothing can be written there.
+    """
+    if given is not None:
+        out = check_out(given)
+        if (before := _read_command(out)) not in (None, list(command)):
+            raise InputError(f"--out {out} holds the results of {shlex.join(before)!r}; choose another folder")
+        return out
+    out, number = default, 1
+    while _read_command(out) not in (None, list(command)):
+        number += 1
+        out = default.with_name(f"{default.name}-{number}")
+    return check_out(out)
+
+
+def _read_command(out: Path) -> list[str] | None:
+    """Of the results in a folder; None where there are none, or none that can be read."""
+    try:
+        return json.loads((out / "results.json").read_text(encoding="utf-8"))["command"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def round_numbers(value: Any) -> Any:
