@@ -6,7 +6,7 @@
 # RUNS is where the runs go (default: runs). A run that is there already is gone on with; one that is complete is left.
 # Beside each: samples, and the minutes that they take at the speeds that the project holds itself to on one H200
 # (stages 1 and 2: 260,000 samples/s; stage 3: 70,000). Measured last: 247,000 and 287,000 on an H100, 75,700 on an H200;
-# navigation 57,000 on an H100.
+# navigation 57,000 on each of two H100s.
 set -euo pipefail
 device="${1:-cuda}"
 runs="${RUNS:-runs}"
