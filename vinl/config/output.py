@@ -82,7 +82,7 @@ def choose_out(given: str | None, default: Path, command: Sequence[str]) -> Path
 def _read_command(out: Path) -> list[str] | None:
     """Of the results in a folder; None where there are none, or none that can be read."""
     try:
-        return json.loads((out / "results.json").read_text(encoding="utf-8"))["command"]
+        return [str(word) for word in json.loads((out / "results.json").read_text(encoding="utf-8"))["command"]]
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
