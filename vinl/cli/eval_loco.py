@@ -23,7 +23,7 @@ class Options:
 
     out: str | None = None
     """Folder for results.json, contacts.png (on blocks) and what --video films (default: runs/eval-loco- and the
-    policies, numbered)."""
+    policies, and a number where that holds the results of another command)."""
     policy: str | None = None
     """A shipped policy's name, or a policy folder or training run (default: loco)."""
     compare: tuple[str, ...] = ()

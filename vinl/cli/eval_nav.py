@@ -17,7 +17,8 @@ class Options:
     policy: str = "nav"
     """A shipped navigation policy's name, the folder of a policy or run, or oracle: the path follower of vinl eval."""
     out: str | None = None
-    """Folder for results.json and report.html (default: runs/eval-nav- and the policy, numbered)."""
+    """Folder for results.json and report.html (default: runs/eval-nav- and the policy, and a number where that holds
+    the results of another command)."""
     floorplans: tuple[str, ...] = ()
     """Floor plans beside the generated homes; FILE:50-99 are plans 50 to 99 of a JSON file, FILE:50- those from 50 on,
     FILE:0-/2 every second."""
