@@ -105,7 +105,7 @@ def test_oracle_walks_the_episode_that_evaluate_walks() -> None:
     _, info = env.reset(seed=0, options={"episode": 0, "seed": 2})
     oracle, rewards, over, out = OracleNavigator(NEAR.oracle), [], False, False
     assert env.trip is not None and env.velocity_range == RANGE
-    began = info["geodesic_m"]
+    began, straight = info["geodesic_m"], info["straight_m"]
     oracle.reset([env.trip.task])
     while not (over or out):
         action = RANGE.action(oracle.act({"pose": env.trip.pose}))[0]
@@ -113,6 +113,7 @@ def test_oracle_walks_the_episode_that_evaluate_walks() -> None:
         rewards.append(reward)
         assert env.observation_space.contains(observation)
     assert info["record"] == plain_record(results.records[0])
+    assert straight == pytest.approx(results.records[0].straight_m, abs=1e-3) and info["straight_m"] < 0.4
     assert over and info["success"] and info["spl"] > 0.8
     n = len(rewards)
     assert n == np.ceil(info["time_s"] / 0.5)

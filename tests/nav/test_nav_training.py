@@ -1,6 +1,7 @@
 """Training of the navigator from the command line: it runs on a CPU, goes on after a kill, in several processes too."""
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,11 +15,12 @@ import torch
 from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.config.loader import build_config
+from vinl.nav import training
 from vinl.nav.config import NavConfig
 from vinl.nav.learning_config import NavPpoConfig
 from vinl.nav.recurrent_model import build_actor, load_critic, load_start, save_critic
 from vinl.nav.recurrent_ppo import count_guesses
-from vinl.nav.training import build_algorithm, make_card, separate
+from vinl.nav.training import build_algorithm, build_environment, make_card, separate
 from vinl.policies.io import load_policy, save_policy
 from vinl.policies.nav_actor import NavActor
 
@@ -87,6 +89,19 @@ def test_killed_and_resumed_it_ends_with_the_very_weights_of_a_run_never_stopped
     assert [row["iteration"] for row in rows(killed)] == list(range(1, 31))
     whole, parts = weights(straight), weights(killed)
     assert all(torch.equal(whole[name], parts[name]) for name in whole)
+
+
+def test_a_complete_run_says_so_before_anything_is_built(tmp_path, small, capsys, monkeypatch):
+    run = tmp_path / "run"
+    assert train(small, run, "--iterations", "1") == 0
+    capsys.readouterr()
+    built = []
+    monkeypatch.setattr(training, "build_environment", lambda *given: built.append(given) or build_environment(*given))
+    again = ["train-nav", "--device", "cpu", "--resume", str(run)]
+    assert main(again) == 0 and not built
+    assert f"trained: {run}/policy" in capsys.readouterr().out
+    shutil.rmtree(run / "policy")  # as if it had been killed between checkpoint and policy
+    assert main(again) == 0 and len(built) == 1 and load_policy(run).card.samples == 32
 
 
 def test_more_iterations_go_on_and_another_run_starts_from_the_policy(tmp_path, small):

@@ -70,6 +70,8 @@ def main(argv: list[str]) -> int:
         config = replace(config, from_policy=options.from_policy or config.from_policy)
     if not is_started():
         _check_devices(options.devices, folder, config)
+        if options.is_complete():
+            return options.tell_end("train-loco", folder, True)
         if options.devices > 1:
             return start_processes(options.devices, "train-loco", argv)
     from rich.console import Console
@@ -89,14 +91,7 @@ def main(argv: list[str]) -> int:
             return INTERRUPTED  # the first process says so, and fails
         print(f"error: {error}", file=sys.stderr)
         return 1
-    if not leads():
-        return 0 if complete else INTERRUPTED
-    if complete:
-        print(f"trained: {folder}/policy  (try: vinl eval --loco {folder})")
-        return 0
-    more = f" --devices {options.devices}" if options.devices > 1 else ""
-    print(f"stopped and saved: go on with  vinl train-loco --resume {folder}{more}")
-    return INTERRUPTED
+    return options.tell_end("train-loco", folder, complete)
 
 
 def _see_one_gpu() -> None:

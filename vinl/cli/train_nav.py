@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vinl.cli.options import parse_options, settings_first
-from vinl.cli.training import INTERRUPTED, TrainingOptions, is_started, leads, start_processes
+from vinl.cli.training import TrainingOptions, is_started, leads, start_processes
 from vinl.config.errors import InputError
 
 
@@ -45,8 +45,11 @@ def main(argv: list[str]) -> int:
     if not source.startswith("nav/") and not source.endswith((".yaml", ".yml")):  # bare names are those of configs/nav
         source = f"nav/{source}"
     folder, config, num_envs = options.open_run(NavConfig, "navigation", source, "nav-")
-    if options.devices > 1 and not is_started():
-        return start_processes(options.devices, "train-nav", argv)
+    if not is_started():
+        if options.is_complete():
+            return options.tell_end("train-nav", folder, True)
+        if options.devices > 1:
+            return start_processes(options.devices, "train-nav", argv)
     from vinl.nav.training import train_navigator
 
     if leads():
@@ -63,10 +66,4 @@ def main(argv: list[str]) -> int:
             profile=options.profile,
             memory=options.memory,
         )
-    if leads():
-        print(
-            f"trained: {folder}/policy  (try: vinl eval-nav --policy {folder} --out {folder}/eval)"
-            if complete
-            else f"stopped and saved: go on with  vinl train-nav --resume {folder}"
-        )
-    return 0 if complete else INTERRUPTED
+    return options.tell_end("train-nav", folder, complete)

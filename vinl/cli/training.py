@@ -130,6 +130,28 @@ class TrainingOptions:
         check_out(folder)
         return folder, config, robots
 
+    def is_complete(self) -> bool:
+        """Whether the run that is to go on has come to its end, which is told before anything is built.
+
+        Raises:
+            InputError: its files are broken.
+        """
+        from vinl.rl.run_folder import RunFolder
+
+        return self.resume is not None and self.iterations is None and RunFolder(self.resume).is_complete()
+
+    def tell_end(self, command: str, folder: str, complete: bool) -> int:
+        """Say how a training ended and what comes next; returns the exit code."""
+        if leads():
+            look = "eval --loco" if command == "train-loco" else "eval-nav --policy"
+            more = f" --devices {self.devices}" if self.devices > 1 else ""
+            print(
+                f"trained: {folder}/policy  (try: vinl {look} {folder})"
+                if complete
+                else f"stopped and saved: go on with  vinl {command} --resume {folder}{more}"
+            )
+        return 0 if complete else INTERRUPTED
+
     def start_logger(self, folder: str) -> None:
         """Begin what the logger needs. TensorBoard's files in the run's folder are always written; Weights & Biases
         reads along.

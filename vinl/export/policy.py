@@ -27,6 +27,7 @@ from vinl.policies.policy import LocomotionPolicy
 
 if TYPE_CHECKING:
     import onnx
+    import onnx_ir
 
 STEPS = 1000
 """Steps that a file is checked on."""
@@ -125,8 +126,10 @@ def build_model(policy: LocomotionPolicy | DepthPolicy) -> onnx.ModelProto:
             verbose=False,
             external_data=False,
             custom_translation_table=_translations(),
+            optimize=False,
         )
     assert program is not None
+    _simplify(program.model)
     model = program.model_proto
     _strip(model)
     model.producer_name, model.producer_version = "vinl", about["vinl_version"]
@@ -134,6 +137,16 @@ def build_model(policy: LocomotionPolicy | DepthPolicy) -> onnx.ModelProto:
     for key, value in about.items():
         model.metadata_props.add(key=key, value=json.dumps(value))
     return model
+
+
+def _simplify(model: onnx_ir.Model) -> None:
+    """What every runtime needs: torch's own pass looks besides for patterns, which takes far longer than the rest of an
+    export and which runtimes find themselves."""
+    from onnxscript import optimizer
+
+    optimizer.inline(model)
+    optimizer.fold_constants(model)
+    optimizer.remove_unused_nodes(model)
 
 
 def _translations() -> dict[Any, Any]:

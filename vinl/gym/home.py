@@ -76,7 +76,7 @@ class HomeEnv(gymnasium.Env):
     the goal, a little less for every 0.5 s and for every 0.5 s in which a wall was touched; with joints the last two
     are spread over the control steps. An episode is terminated at the goal or by a fall, truncated when time is over.
 
-    Each ``info`` has ``plan``, ``time_s``, ``distance_m`` (straight) and ``geodesic_m`` to the goal, ``foot_steps``
+    Each ``info`` has ``plan``, ``time_s``, ``straight_m`` and ``geodesic_m`` to the goal, ``foot_steps``
     (control steps with a foot on a block or a wall), ``success`` and ``end_reason`` (empty while under way); at the end
     also ``spl``, ``foot_collisions_per_m`` and ``record``, the episode as it would stand in ``results.json``.
 
@@ -256,7 +256,7 @@ class HomeEnv(gymnasium.Env):
         info: dict[str, Any] = {
             "plan": trip.setup.plan,
             "time_s": trip.steps * CONTROL_DT,
-            "distance_m": float(trip.goal[0, 0]),
+            "straight_m": float(trip.goal[0, 0]),
             "geodesic_m": trip.geodesic_m,
             "foot_steps": trip.foot_steps,
             "success": trip.end == "success",

@@ -14,6 +14,7 @@ import yaml
 
 from vinl.config.errors import InputError
 from vinl.config.output import write_text, write_whole
+from vinl.policies.card import CARD_FILE, read_card
 
 CONFIG = "config.yaml"
 METRICS = "metrics.jsonl"
@@ -113,6 +114,18 @@ class RunFolder:
         except (RuntimeError, OSError, EOFError, pickle.UnpicklingError, ValueError) as error:
             first = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise InputError(f"{file} is broken ({first}); remove it to start the run anew") from None
+
+    def is_complete(self) -> bool:
+        """Whether all iterations of the configuration are in the newest checkpoint and in the policy.
+
+        Raises:
+            InputError: configuration, checkpoint or card are broken.
+        """
+        checkpoint = self.load_checkpoint()
+        if checkpoint is None or checkpoint["iteration"] < self.open()["iterations"]:
+            return False
+        # a kill may come between checkpoint and policy
+        return (self.policy / CARD_FILE).exists() and read_card(self.policy).samples == checkpoint["samples"]
 
     def save_lost(self, state: dict[str, Any]) -> Path | None:
         """Save the state of a robot whose numbers went wrong, with the run's configuration, for ``vinl replay-nan``.
