@@ -68,7 +68,7 @@ def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("environment")
     venv.create(folder, with_pip=True)
     for packages in (["torch==2.13.*"], [str(wheel)]):
-        install = [str(folder / "bin" / "pip"), "install", "--quiet", *packages]
+        install = [str(folder / "bin" / "pip"), "install", "--quiet", "--no-compile", *packages]  # as needed is sooner
         done = subprocess.run(install, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
     return folder / "bin"
