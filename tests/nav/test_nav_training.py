@@ -100,8 +100,10 @@ def test_a_complete_run_says_so_before_anything_is_built(tmp_path, small, capsys
     again = ["train-nav", "--device", "cpu", "--resume", str(run)]
     assert main(again) == 0 and not built
     assert f"trained: {run}/policy" in capsys.readouterr().out
-    shutil.rmtree(run / "policy")  # as if it had been killed between checkpoint and policy
+    (run / "policy" / "card.json").write_text("{")  # what cannot be read is written anew
     assert main(again) == 0 and len(built) == 1 and load_policy(run).card.samples == 32
+    shutil.rmtree(run / "policy")  # as if it had been killed between checkpoint and policy
+    assert main(again) == 0 and len(built) == 2 and load_policy(run).card.samples == 32
 
 
 def test_more_iterations_go_on_and_another_run_starts_from_the_policy(tmp_path, small):

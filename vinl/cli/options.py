@@ -8,7 +8,6 @@ import contextlib
 import dataclasses
 import inspect
 import io
-import json
 import re
 import textwrap
 from collections.abc import Sequence
@@ -237,17 +236,14 @@ def check_run(folder: str, kind: str, iterations: int | None) -> None:
     Raises:
         InputError: it is one, or no run.
     """
-    from vinl.rl.run_folder import METRICS, RunFolder
+    from vinl.rl.run_folder import RunFolder
 
     run = RunFolder(folder)
     found = "navigation" if "homes" in run.open() else "locomotion"
     if found != kind:
         raise InputError(f"{folder} is a {found} run: use {COMMANDS[found]} --resume {folder}")
-    done, curves = 0, run.path / METRICS
-    for line in reversed(curves.read_text(encoding="utf-8").splitlines() if curves.is_file() else []):
-        with contextlib.suppress(ValueError, KeyError, TypeError):  # a line that a kill cut off
-            done = int(json.loads(line)["iteration"])
-            break
+    row = run.read_last_metrics()
+    done = 0 if row is None else row["iteration"]
     if iterations is not None and done >= iterations:
         raise InputError(
             f"{folder} already has {done} iteration{'s' if done != 1 else ''}; give more with --iterations"

@@ -46,6 +46,10 @@ class Options(TrainingOptions):
 STAGES = {1: "loco/rough", 2: "loco/teacher", 3: "loco/student"}
 
 
+_NEXT = "train-loco", "eval --loco"
+"""Commands that go on with a run, and that look at its policy."""
+
+
 def main(argv: list[str]) -> int:
     """Run the command; returns 130 after an interrupt, 1 where numbers were not finite."""
     options = parse_options(Options, settings_first(Options, argv), "train-loco")
@@ -71,7 +75,7 @@ def main(argv: list[str]) -> int:
     if not is_started():
         _check_devices(options.devices, folder, config)
         if options.is_complete():
-            return options.tell_end("train-loco", folder, True)
+            return options.tell_end(folder, True, *_NEXT)
         if options.devices > 1:
             return start_processes(options.devices, "train-loco", argv)
     from rich.console import Console
@@ -91,7 +95,7 @@ def main(argv: list[str]) -> int:
             return INTERRUPTED  # the first process says so, and fails
         print(f"error: {error}", file=sys.stderr)
         return 1
-    return options.tell_end("train-loco", folder, complete)
+    return options.tell_end(folder, complete, *_NEXT)
 
 
 def _see_one_gpu() -> None:

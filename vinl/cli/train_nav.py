@@ -28,6 +28,10 @@ class Options(TrainingOptions):
     """Write where the time of the sixth iteration goes to profile.txt in the run's folder."""
 
 
+_NEXT = "train-nav", "eval-nav --policy"
+"""Commands that go on with a run, and that look at its policy."""
+
+
 def main(argv: list[str]) -> int:
     """Run the command; returns 130 after an interrupt."""
     options = parse_options(Options, settings_first(Options, argv), "train-nav")
@@ -47,7 +51,7 @@ def main(argv: list[str]) -> int:
     folder, config, num_envs = options.open_run(NavConfig, "navigation", source, "nav-")
     if not is_started():
         if options.is_complete():
-            return options.tell_end("train-nav", folder, True)
+            return options.tell_end(folder, True, *_NEXT)
         if options.devices > 1:
             return start_processes(options.devices, "train-nav", argv)
     from vinl.nav.training import train_navigator
@@ -66,4 +70,4 @@ def main(argv: list[str]) -> int:
             profile=options.profile,
             memory=options.memory,
         )
-    return options.tell_end("train-nav", folder, complete)
+    return options.tell_end(folder, complete, *_NEXT)

@@ -134,16 +134,19 @@ class TrainingOptions:
         """Whether the run that is to go on has come to its end, which is told before anything is built.
 
         Raises:
-            InputError: its files are broken.
+            InputError: its configuration is broken.
         """
         from vinl.rl.run_folder import RunFolder
 
         return self.resume is not None and self.iterations is None and RunFolder(self.resume).is_complete()
 
-    def tell_end(self, command: str, folder: str, complete: bool) -> int:
-        """Say how a training ended and what comes next; returns the exit code."""
+    def tell_end(self, folder: str, complete: bool, command: str, look: str) -> int:
+        """Say how a training ended and what comes next: to look at the policy, or to go on with the ``command``.
+
+        Returns:
+            The exit code.
+        """
         if leads():
-            look = "eval --loco" if command == "train-loco" else "eval-nav --policy"
             more = f" --devices {self.devices}" if self.devices > 1 else ""
             print(
                 f"trained: {folder}/policy  (try: vinl {look} {folder})"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import pickle
@@ -14,7 +15,7 @@ import yaml
 
 from vinl.config.errors import InputError
 from vinl.config.output import write_text, write_whole
-from vinl.policies.card import CARD_FILE, read_card
+from vinl.policies.card import read_card
 
 CONFIG = "config.yaml"
 METRICS = "metrics.jsonl"
@@ -115,17 +116,28 @@ class RunFolder:
             first = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise InputError(f"{file} is broken ({first}); remove it to start the run anew") from None
 
+    def read_last_metrics(self) -> dict[str, float] | None:
+        """The newest whole line of the curves; None: there is none."""
+        curves = self.path / METRICS
+        for line in reversed(curves.read_text(encoding="utf-8").splitlines() if curves.is_file() else []):
+            with contextlib.suppress(ValueError, KeyError, TypeError):  # a line that a kill cut off
+                row = json.loads(line)
+                return row | {"iteration": int(row["iteration"])}
+        return None
+
     def is_complete(self) -> bool:
-        """Whether all iterations of the configuration are in the newest checkpoint and in the policy.
+        """Whether the policy is that of the last iteration of the configuration.
 
         Raises:
-            InputError: configuration, checkpoint or card are broken.
+            InputError: the configuration is broken.
         """
-        checkpoint = self.load_checkpoint()
-        if checkpoint is None or checkpoint["iteration"] < self.open()["iterations"]:
+        row, wanted = self.read_last_metrics(), self.open().get("iterations")
+        if row is None or not isinstance(wanted, int) or row["iteration"] < wanted:
             return False
-        # a kill may come between checkpoint and policy
-        return (self.policy / CARD_FILE).exists() and read_card(self.policy).samples == checkpoint["samples"]
+        try:  # checkpoint and policy are written after the curves, and a kill may come between
+            return read_card(self.policy).samples == row.get("samples")
+        except InputError:  # it is written anew
+            return False
 
     def save_lost(self, state: dict[str, Any]) -> Path | None:
         """Save the state of a robot whose numbers went wrong, with the run's configuration, for ``vinl replay-nan``.
