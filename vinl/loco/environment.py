@@ -15,6 +15,7 @@ from vinl.gait.observation import GAIT_ROWS, STEPPING_MAP_TABLE, insert_gait, ob
 from vinl.gait.state import GaitState, feet_in_heading_frame
 from vinl.loco.config import MAX_LATENCY, LocoConfig, RandomisationConfig, RewardConfig
 from vinl.loco.curriculum import next_levels
+from vinl.loco.kept_program import KeptProgram
 from vinl.loco.measures import TERMS, average_sums, sum_measures, tile_cover
 from vinl.loco.nan_guard import KEPT, REASONS, Lost, keep_lost
 from vinl.loco.randomisation import draw_commands, uniform
@@ -113,11 +114,14 @@ class LocoEnvironment:
         self._noise = STEPPING_MAP_TABLE.noise * _noise_of_rows(config.randomisation)
         self.set_rewards(config.rewards)
         self.set_noise(1.0)
-        self._step = jax.jit(self._advance, donate_argnums=(1, 2))
         self._look = jax.jit(self._observe)
         key = jax.random.PRNGKey(config.seed if seed is None else seed)
         self.state: EnvState = jax.device_put(jax.jit(self._first_state)(key), device)
         self._lost: Lost = jax.device_put(Lost.none(), device)
+        observed = Observations(*range(len(Observations._fields)))  # type: ignore[arg-type]
+        outputs = self.state, self._lost, StepResult(observed, *range(len(StepResult._fields) - 1))  # type: ignore[arg-type]
+        reads = repr(config), self._starts, self._cover, self.simulation.save_model()
+        self._step = KeptProgram(self._advance, donated=(1, 2), outputs=outputs, reads=reads)
 
     def set_rewards(self, rewards: RewardConfig) -> None:
         """Weights and widths from the next step on; a training may move them without compiling anew."""

@@ -8,8 +8,9 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, UInt8
 from mujoco import mjx
+from mujoco.mjx._src import collision_driver
 from scipy import ndimage
 
 from vinl.gait.ground_view import GroundMap, build_ground_map
@@ -193,6 +194,12 @@ class Simulation:
         self._ground_rows, self._leg_rows = self._find_contact_rows()
         self._substeps = jax.vmap(self._control_step, in_axes=(None, 0, 0, 0))
 
+    def save_model(self) -> UInt8[np.ndarray, " bytes"]:
+        """The robot, the ground and how they collide, as MuJoCo saves them."""
+        saved = np.empty(mujoco.mj_sizeModel(self.model), np.uint8)
+        mujoco.mj_saveModel(self.model, None, saved)
+        return saved
+
     def set_solid(self, solid: bool) -> None:
         """From the next step on blocks collide, or are only seen and judged; nothing is compiled anew."""
         if solid == self._is_solid:  # asked before every iteration: without a wait for the device
@@ -206,11 +213,10 @@ class Simulation:
     def _find_contact_rows(self) -> tuple[np.ndarray, np.ndarray]:
         """(spheres, 4) which rows of MJX's contact arrays hold which sphere against the ground, and (k,) which a leg
         against another: they never change."""
-
-        def collide(normalised: Array) -> Array:
-            return mjx.collision(self._mx.replace(hfield_data=normalised), self._start)._impl.contact.geom
-
-        geom = np.asarray(jax.jit(collide)(self.ground.normalised))
+        # as mjx.collision lays them out; to trace it for this alone would take seconds
+        groups = sorted(collision_driver._geom_groups(self.model).items(), key=lambda item: item[0].condim)
+        points = [collision_driver._COLLISION_FUNC[key.types].ncon for key, _ in groups]  # type: ignore[index]
+        geom = np.concatenate([np.repeat(pairs, n, 0) for n, (_, pairs) in zip(points, groups, strict=True)])[:, :2]
         on_ground = (geom == self.model.geom("ground").id).any(1)
         rows = np.stack([np.flatnonzero((geom == sphere).any(1) & on_ground) for sphere in self._spheres])
         if rows.size != on_ground.sum():
