@@ -48,9 +48,8 @@ class KeptProgram:
 
     def _open(self, arguments: tuple[Any, ...]) -> Callable[..., Any]:
         leaves, tree = jax.tree.flatten(arguments)
-        ends = np.cumsum([len(jax.tree.leaves(argument)) for argument in arguments])
-        starts = np.concatenate([[0], ends[:-1]])
-        donated = tuple(k for at in self._donated for k in range(starts[at], ends[at]))
+        of = [at for at, argument in enumerate(arguments) for _ in jax.tree.leaves(argument)]
+        donated = tuple(k for k, at in enumerate(of) if at in self._donated)
 
         def flat(*leaves: Any) -> list[Any]:
             return jax.tree.leaves(self._function(*jax.tree.unflatten(tree, leaves)))
@@ -85,7 +84,10 @@ class KeptProgram:
 
 def _read(path: Path) -> export.Exported | None:
     """None: it is not there, or damaged."""
-    data = path.read_bytes() if path.is_file() else b""
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
     if hashlib.sha256(data[_SHA:]).digest() != data[:_SHA]:
         return None
     return export.deserialize(bytearray(data[_SHA:]))
@@ -93,7 +95,5 @@ def _read(path: Path) -> export.Exported | None:
 
 def _write(path: Path, exported: export.Exported) -> None:
     data = bytes(exported.serialize())
-    with suppress(OSError):  # a full disk costs the next start some seconds, no more
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with write_whole(path) as file:
-            file.write(hashlib.sha256(data).digest() + data)
+    with suppress(OSError), write_whole(path) as file:  # a full disk costs the next start some seconds, no more
+        file.write(hashlib.sha256(data).digest() + data)
