@@ -13,10 +13,11 @@ import jax
 import numpy as np
 from jax import export
 
-import vinl
 from vinl.config.output import write_whole
 
 _SHA = 32
+
+_PACKAGE = Path(__file__).resolve().parents[1]
 
 _config: Any = jax.config  # type checkers do not know its flags
 
@@ -71,7 +72,7 @@ class KeptProgram:
         versions = [version(name) for name in ("jax", "jaxlib", "mujoco", "mujoco-mjx", "numpy")]
         words = [versions, flags, device.platform, device.device_kind, str(tree), [repr(jax.typeof(x)) for x in leaves]]
         digest = hashlib.sha256(repr(words).encode())
-        for file in sorted(Path(vinl.__file__).parent.rglob("*.py")):
+        for file in sorted(_PACKAGE.rglob("*.py")):
             digest.update(file.read_bytes())
         for part in jax.tree.leaves(self._reads):
             if isinstance(part, (np.ndarray, jax.Array)):
