@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import torch
+from mujoco import mjx
 
 from vinl.gait.observation import STEPPING_MAP_TABLE, insert_gait, observe_gait
 from vinl.gait.state import GaitState, feet_in_heading_frame, swings
@@ -44,6 +45,23 @@ def test_a_run_goes_on_from_what_was_seen_though_saved_again_before_a_step(fresh
     third.load_state(second.save_state())
     torch.testing.assert_close(third.get_observations()["policy"], seen + 1.0, rtol=0, atol=0)
     torch.testing.assert_close(third.get_observations()["policy"], seen)
+
+
+def test_contact_rows_are_those_of_mjx(env):
+    """They are read off its tables, not off a collision."""
+    simulation = env.simulation
+
+    def collide(normalised):
+        data = mjx.collision(simulation._mx.replace(hfield_data=normalised), simulation._start)
+        return data._impl.contact.geom
+
+    geom = np.asarray(jax.jit(collide)(simulation.ground.normalised))
+    ground = simulation.model.geom("ground").id
+    for sphere, rows in zip(simulation._spheres, simulation._ground_rows, strict=True):
+        assert len(rows) == 4 and (np.sort(geom[rows]) == np.sort([sphere, ground])).all()
+    assert (geom[simulation._leg_rows] != ground).all()
+    every = np.concatenate([simulation._ground_rows.ravel(), simulation._leg_rows])
+    assert np.array_equal(np.sort(every), np.arange(len(geom)))
 
 
 def test_observation_is_that_of_the_evaluation(fresh):

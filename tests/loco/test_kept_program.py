@@ -34,8 +34,8 @@ def start():
             traced.append(1)
             return Pair(pair.second * scale["by"], pair.first * factor), pair.first.sum()
 
-        outputs = Pair(*range(2)), 0
-        return KeptProgram(function, donated=(1,), outputs=outputs, reads=("function", np.float32(factor))), traced
+        outputs, reads = (Pair(*range(2)), 0), ("function", np.float32(factor))
+        return KeptProgram(function, donated=(1,), outputs=outputs, reads=lambda: reads), traced
 
     return start
 

@@ -120,8 +120,7 @@ class LocoEnvironment:
         self._lost: Lost = jax.device_put(Lost.none(), device)
         observed = Observations(*range(len(Observations._fields)))  # type: ignore[arg-type]
         outputs = self.state, self._lost, StepResult(observed, *range(len(StepResult._fields) - 1))  # type: ignore[arg-type]
-        reads = repr(config), self._starts, self._cover, self.simulation.save_model()
-        self._step = KeptProgram(self._advance, donated=(1, 2), outputs=outputs, reads=reads)
+        self._step = KeptProgram(self._advance, donated=(1, 2), outputs=outputs, reads=self._constants)
 
     def set_rewards(self, rewards: RewardConfig) -> None:
         """Weights and widths from the next step on; a training may move them without compiling anew."""
@@ -184,6 +183,10 @@ class LocoEnvironment:
     @property
     def _settings(self) -> Settings:
         return Settings(self._rewards, self._noise_now)
+
+    def _constants(self) -> tuple[Any, ...]:
+        """All that a step is traced with, beside its arguments."""
+        return self.config, self._starts, self._cover, self.simulation.save_model()
 
     def _first_state(self, key: Array) -> EnvState:
         return first_state(self.config, self._starts, key)

@@ -33,10 +33,13 @@ class KeptProgram:
         function: of pytrees of arrays.
         donated: which arguments it may use up.
         outputs: a pytree of the structure that it returns.
-        reads: what it reads beside its arguments: a pytree of arrays and of what has a ``repr``.
+        reads: tells what it reads beside its arguments: a pytree of arrays and of what has a ``repr``. Asked once,
+            and only where programs are kept.
     """
 
-    def __init__(self, function: Callable[..., Any], donated: tuple[int, ...], outputs: Any, reads: Any) -> None:
+    def __init__(
+        self, function: Callable[..., Any], donated: tuple[int, ...], outputs: Any, reads: Callable[[], Any]
+    ) -> None:
         self._function, self._donated, self._reads = function, donated, reads
         self._outputs = jax.tree.structure(outputs)
         self._program: Callable[..., Any] | None = None
@@ -74,7 +77,7 @@ class KeptProgram:
         digest = hashlib.sha256(repr(words).encode())
         for file in sorted(_PACKAGE.rglob("*.py")):
             digest.update(file.read_bytes())
-        for part in jax.tree.leaves(self._reads):
+        for part in jax.tree.leaves(self._reads()):
             if isinstance(part, (np.ndarray, jax.Array)):
                 part = np.asarray(part)
                 digest.update(repr((part.shape, part.dtype)).encode() + part.tobytes())
