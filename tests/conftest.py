@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import math
 import os
@@ -12,17 +13,20 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 import hypothesis
+import own_bytecode
 import pytest
 import sparing_checks
 from beartype import BeartypeConf, beartype
 from jaxtyping import install_import_hook
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Generator
 
     import mujoco
 
     from vinl.world.boxes import Boxes
+
+gc.disable()  # until all is imported, which stays
 
 for _name, _value in {
     "JAX_PLATFORMS": "cpu",
@@ -48,6 +52,7 @@ _checker = ModuleType("vinl_type_checker")
 _checker.check = beartype(conf=BeartypeConf(is_pep484_tower=True))  # type: ignore[attr-defined]  # an int is a float
 sys.modules["vinl_type_checker"] = _checker
 sparing_checks.install()
+own_bytecode.install()
 install_import_hook(_checked_modules(), "vinl_type_checker.check")  # before the first import of vinl in this process
 
 pytest_plugins = ["small_home"]
@@ -62,6 +67,16 @@ def pytest_configure(config: pytest.Config) -> None:
     """Keep XLA's compiled programs beside pytest's cache: the second run starts in a fraction of the time."""
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.rootpath / ".pytest_cache" / "xla" / _processor()))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.5")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """The garbage collector leaves out what was imported: a million objects of libraries, and JAX collects often."""
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
