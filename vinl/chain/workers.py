@@ -4,6 +4,7 @@ progress bar for calls from Python."""
 from __future__ import annotations
 
 import contextlib
+import gc
 import multiprocessing
 import os
 import pickle
@@ -134,6 +135,7 @@ def _start(luggage: Any, messages: Any, stop: Any) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     torch.set_num_threads(1)
     _context = Context(pickle.loads(luggage.get()), lambda *piece: messages.put(piece), stop.is_set)
+    gc.freeze()  # all that was imported: the garbage collector need not look through it
 
 
 def _end_with_parent() -> None:

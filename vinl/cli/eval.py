@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vinl.cli.imports import kept_imports
 from vinl.cli.options import Settings, default_out, load_rules, parse_options, settings_first
 from vinl.config.errors import InputError
 
@@ -95,12 +96,13 @@ class Options:
 def main(argv: list[str]) -> int:
     """Run the evaluation and print where its files lie."""
     options = parse_options(Options, settings_first(Options, argv), "eval")
-    from vinl.benchmark.evaluate import check_numbers, name_apart
-    from vinl.benchmark.folders import check_folder
-    from vinl.benchmark.protocol import Films, Protocol, read_routes
-    from vinl.chain.choose import best_locomotor, best_navigator
-    from vinl.config.output import check_out, strip_command
-    from vinl.world.readers import load_floorplans
+    with kept_imports():
+        from vinl.benchmark.evaluate import check_numbers, name_apart
+        from vinl.benchmark.folders import check_folder
+        from vinl.benchmark.protocol import Films, Protocol, read_routes
+        from vinl.chain.choose import best_locomotor, best_navigator
+        from vinl.config.output import check_out, strip_command
+        from vinl.world.readers import load_floorplans
 
     many = "table" if options.table else "faults" if options.faults else ""
     who = (many,) if many else (options.loco or best_locomotor(), options.nav or best_navigator())

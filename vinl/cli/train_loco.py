@@ -7,6 +7,7 @@ import sys
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from vinl.cli.imports import kept_imports
 from vinl.cli.options import parse_options, settings_first
 from vinl.cli.training import INTERRUPTED, TrainingOptions, is_started, leads, start_processes
 from vinl.config.errors import InputError
@@ -56,7 +57,8 @@ def main(argv: list[str]) -> int:
     options.check()
     if is_started():
         _see_one_gpu()
-    device = options.choose_device()
+    with kept_imports():
+        device = options.choose_device()
     os.environ.setdefault("JAX_PLATFORMS", "cpu" if device == "cpu" else "cuda,cpu")
 
     from vinl.rl.machine import use_compile_cache
@@ -81,7 +83,7 @@ def main(argv: list[str]) -> int:
     from rich.console import Console
 
     # some seconds; says nothing where it is piped
-    with Console(stderr=True, quiet=not leads()).status("loading JAX and the simulator"):
+    with Console(stderr=True, quiet=not leads()).status("loading JAX and the simulator"), kept_imports():
         from vinl.loco.training import train_locomotor
 
     if leads():

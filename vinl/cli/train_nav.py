@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vinl.cli.imports import kept_imports
 from vinl.cli.options import parse_options, settings_first
 from vinl.cli.training import TrainingOptions, is_started, leads, start_processes
 from vinl.config.errors import InputError
@@ -38,7 +39,8 @@ def main(argv: list[str]) -> int:
     options.check()
     if options.memory is not None and options.memory <= 0:
         raise InputError(f"--memory must be positive, got {options.memory}")
-    device = options.choose_device()
+    with kept_imports():
+        device = options.choose_device()
 
     from vinl.cli.options import check_config
     from vinl.nav.config import NavConfig
@@ -54,7 +56,8 @@ def main(argv: list[str]) -> int:
             return options.tell_end(folder, True, *_NEXT)
         if options.devices > 1:
             return start_processes(options.devices, "train-nav", argv)
-    from vinl.nav.training import train_navigator
+    with kept_imports():
+        from vinl.nav.training import train_navigator
 
     if leads():
         options.start_logger(folder)
