@@ -22,6 +22,10 @@ _seen: set[tuple[Any, ...]] = set()
 """How often each function was called in this test, and with arguments of which types and shapes."""
 
 
+_arrays: dict[type, bool] = {}
+"""Whether what is of a type has a shape and a kind of numbers."""
+
+
 def begin_test() -> None:
     """Check the first calls of every function again."""
     _calls.clear()
@@ -51,7 +55,9 @@ def _check_sparingly(*, typechecker: Callable[..., Any]) -> Callable[[Any], Any]
             if _is_compiling():  # what is counted would become a part of the program
                 return fn(*args, **kwargs)
             count = _calls[code] = _calls.get(code, 0) + 1
-            given = (code, *map(_describe, args), *kwargs, *map(_describe, kwargs.values()))
+            given: tuple[Any, ...] = (code, *map(_describe, args))
+            if kwargs:
+                given += (*kwargs, *map(_describe, kwargs.values()))
             if count > _FIRST and count % _EVERY and given in _seen:
                 return fn(*args, **kwargs)
             if checked is None:  # only now: to write a checker takes a millisecond, and inner functions are made often
@@ -67,5 +73,8 @@ def _check_sparingly(*, typechecker: Callable[..., Any]) -> Callable[[Any], Any]
 
 def _describe(value: Any) -> Any:
     """Type, shape and kind of numbers: what a check looks at."""
-    shape = getattr(value, "shape", None)
-    return (type(value), shape, value.dtype) if isinstance(shape, tuple) and hasattr(value, "dtype") else type(value)
+    kind = type(value)
+    is_array = _arrays.get(kind)
+    if is_array is None:  # asked once: a look for an attribute that is not there takes longer than all the rest
+        is_array = _arrays[kind] = hasattr(kind, "shape") and hasattr(kind, "dtype")
+    return (kind, value.shape, value.dtype) if is_array else kind
