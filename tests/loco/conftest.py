@@ -7,6 +7,7 @@ from types import ModuleType
 
 import jax
 import pytest
+from first_state import first_state
 
 from vinl.config.loader import load_config
 from vinl.gait.config import GaitConfig
@@ -61,7 +62,7 @@ def share_environment(monkeypatch: pytest.MonkeyPatch):
             env.set_rewards(config.rewards)
             env.set_noise(1.0)
             env.simulation.set_solid(True)
-            env.state = jax.device_put(jax.jit(env._first_state)(jax.random.PRNGKey(config.seed)), jax.devices()[0])
+            env.state = jax.device_put(first_state(env)(jax.random.PRNGKey(config.seed)), jax.devices()[0])
             env.take_lost()
             return env
 

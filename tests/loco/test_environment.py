@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import torch
+from first_state import first_state
 from mujoco import mjx
 
 from vinl.gait.observation import STEPPING_MAP_TABLE, insert_gait, observe_gait
@@ -32,7 +33,7 @@ def env(small_config):
 @pytest.fixture
 def fresh(env, small_config):
     """The environment in its first state."""
-    env.state = jax.device_put(jax.jit(env._first_state)(jax.random.PRNGKey(0)), jax.devices()[0])
+    env.state = jax.device_put(first_state(env)(jax.random.PRNGKey(0)), jax.devices()[0])
     return env
 
 
@@ -190,8 +191,8 @@ def test_physics_that_blew_up_never_reaches_the_learner(fresh):
 
 
 def test_same_seed_same_robots(small_config, env):
-    one = jax.jit(env._first_state)(jax.random.PRNGKey(5))
-    two = jax.jit(env._first_state)(jax.random.PRNGKey(5))
+    one = first_state(env)(jax.random.PRNGKey(5))
+    two = first_state(env)(jax.random.PRNGKey(5))
     assert all(bool((a == b).all()) for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(two), strict=True))
 
 
@@ -220,7 +221,7 @@ def test_contacts_tell_blocks_from_walls_from_ground(small_config):
 
 
 def test_pushes_set_the_velocity(small_config, env):
-    state = jax.jit(env._first_state)(jax.random.PRNGKey(1))
+    state = first_state(env)(jax.random.PRNGKey(1))
     env.state = jax.device_put(state._replace(push_left=state.push_left.at[:].set(5).at[0].set(0)), jax.devices()[0])
     before = np.asarray(env.state.body.qvel)
     env.step(jnp.zeros((8, 12)))

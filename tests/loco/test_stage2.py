@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 import torch
+from first_state import first_state
 from small_tiles import BLOCK_TILES
 from tensordict import TensorDict
 
@@ -201,7 +202,7 @@ def test_feet_and_shanks_on_a_block_are_counted_and_those_beside_it_are_not(env)
         for across, bottom, touches in cases:
             poses.append(pose_feet(block, 0.0, across, bottom))
             expected.append(touches)
-    state = jax.jit(env._first_state)(jax.random.PRNGKey(0))
+    state = first_state(env)(jax.random.PRNGKey(0))
     n = len(poses)
     body = state.body._replace(qpos=jnp.asarray(np.stack(poses), jnp.float32), qvel=jnp.zeros((n, 18)))
     quiet = {"life": state.life + 1, "step": jnp.zeros(n, jnp.int32), "push_left": jnp.full(n, 99, jnp.int32)}
@@ -253,7 +254,7 @@ def test_the_environment_knows_who_walks_over_blocks(env):
     cover = tile_cover(env.terrain)
     assert cover.shape == env.terrain.starts.shape[:2] and (cover[0] == 0).all()
     assert cover.sum() * TILE**2 == pytest.approx((rows[:, 3] * rows[:, 4]).sum(), rel=0.25)
-    start = jax.jit(env._first_state)(jax.random.PRNGKey(0))
+    start = first_state(env)(jax.random.PRNGKey(0))
     level = int(np.argmax(cover[:, 0]))
     qpos = start.body.qpos.at[:, :2].set(jnp.asarray(rows[0, :2], jnp.float32)).at[:, 2].set(1.0)
     state = start._replace(body=start.body._replace(qpos=qpos), level=start.level * 0 + level, column=start.column * 0)

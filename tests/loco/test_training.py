@@ -114,11 +114,10 @@ def test_devices_share_the_robots(small_config):
 @pytest.mark.slow
 def test_two_processes_train_one_policy(tmp_path, small_overrides, capfd):
     run, all_robots = tmp_path / "run", "num_envs=16"  # eight each: compiled for other tests already
-    subprocess.run(
-        [*TRAIN, "--out", str(run), *small_overrides, all_robots, "iterations=2", "--devices", "2"], check=True
-    )
+    two = ["train-loco", "--device", "cpu", "--devices", "2"]
+    assert main([*two, "--out", str(run), *small_overrides, all_robots, "iterations=2"]) == 0
     assert capfd.readouterr().out.count("trained") == 1
-    subprocess.run([*TRAIN, "--resume", str(run), "--iterations", "3", "--devices", "2"], check=True)
+    assert main([*two, "--resume", str(run), "--iterations", "3"]) == 0
     first, second = (torch.load(p / "checkpoint.pt", weights_only=True) for p in (run, run / "rank1"))
     for name in ("actor_state_dict", "critic_state_dict"):
         other = second["algorithm"][name]
