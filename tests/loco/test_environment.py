@@ -120,8 +120,9 @@ def test_an_action_takes_effect_after_the_robots_latency(fresh):
 
 
 def test_the_gait_walks_on_its_own_clock_and_can_be_given(fresh):
-    told = jnp.tile(jnp.array([0.5, 0.0, 0.0]), (8, 1))
-    fresh.state = fresh.state._replace(command=told, command_left=jnp.full(8, 1000, jnp.int32))
+    told = {"command": jnp.tile(jnp.array([0.5, 0.0, 0.0]), (8, 1)), "command_left": jnp.full(8, 1000, jnp.int32)}
+    # placed like the rest of the state: else the step is compiled anew
+    fresh.state = fresh.state._replace(**jax.device_put(told, jax.devices()[0]))
     swung = []
     for _ in range(60):
         fresh.step(jnp.zeros((8, 12)))
