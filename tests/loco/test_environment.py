@@ -205,6 +205,7 @@ def test_contacts_tell_blocks_from_walls_from_ground(small_config):
     sim = Simulation(field, 40.0, 2.0)
     poses = [home_qpos(0, 0, 0.37), home_qpos(0, 3, 0.52), home_qpos(0, -3, 0.37), home_qpos(3, 0, 2.0)]
     body = Body(jnp.asarray(np.stack(poses), jnp.float32), jnp.zeros((4, 18)), jnp.zeros((4, 18)))
+    body = jax.device_put(body, jax.devices()[0])  # placed like what a step returns: else it is compiled twice
     step, still = jax.jit(sim.step), jnp.broadcast_to(jnp.asarray(DEFAULT_POSE, jnp.float32), (4, PAST, 12))
     seen = []
     for _ in range(10):
