@@ -1,5 +1,6 @@
 """Office floors and homes with dead ends: as large as asked for, in one piece, the same again, kept for judging."""
 
+from dataclasses import replace
 from random import Random
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from vinl.config.errors import InputError
 from vinl.world.floorplan import measure_clearance
-from vinl.world.free_space import FIT_RADIUS
+from vinl.world.free_space import FIT_RADIUS, distance_field, read_field
 from vinl.world.homes import generate_home
 from vinl.world.homes.config import HomeConfig, layout_config
 from vinl.world.homes.generate import JUDGING_SETS, RESERVED_FROM, JudgingSet, draw_shell, find_judging_set
@@ -22,7 +23,7 @@ def count_doors(seed: int, config: HomeConfig) -> tuple[int, int, int]:
     return len(shell.rooms), len(pairs), int((each == 1).sum())
 
 
-@pytest.mark.parametrize("layout", ["dead_ends", "office"])
+@pytest.mark.parametrize("layout", ["dead_ends", "office", "narrow"])
 def test_every_floor_is_in_one_piece_and_of_its_size(layout):
     config = layout_config(layout)
     for seed in range(6):
@@ -45,6 +46,27 @@ def test_rooms_of_homes_with_dead_ends_make_a_tree():
     assert single > 0.35 * rooms
     loops = [count_doors(seed, HomeConfig()) for seed in range(20)]
     assert sum(doors for _, doors, _ in loops) > sum(count - 1 for count, _, _ in loops)
+
+
+def test_gaps_close_ways_and_no_room():
+    """Between the same places paths are longer by metres here and there, and none is gone."""
+    config, added, longer = layout_config("narrow"), 0, 0
+    for seed in range(6):
+        plan, plain = (generate_home(seed, replace(config, gaps=gaps)) for gaps in (config.gaps, 0.0))
+        more = len(plan.boxes.rows) - len(plain.boxes.rows)
+        assert 0 <= more <= config.gaps * plan.inside.sum() * plan.frame.resolution**2 / 100 + 1
+        added += more
+        clear = [measure_clearance(home.free, home.frame.resolution) >= FIT_RADIUS for home in (plan, plain)]
+        cells = np.argwhere(clear[0])[:: max(int(clear[0].sum() / 40), 1)]
+        for cell in cells[::4]:
+            paths = [distance_field(floor, plan.frame, plan.frame.xy(cell)) for floor in clear]
+            after, before = (read_field(field, plan.frame, plan.frame.xy(cells)) for field in paths)
+            there = np.isfinite(before)
+            assert np.isfinite(after[there]).mean() > 0.95  # but for pockets
+            both = there & np.isfinite(after)
+            assert (after[both] > before[both] - 0.01).all()
+            longer += (after[both] > before[both] + 2.0).any()
+    assert added >= 6 and longer >= 6
 
 
 def test_offices_have_corridors_that_the_rooms_open_onto():

@@ -23,8 +23,8 @@ class Options:
     """Floor plans beside the generated homes; FILE:50-99 are plans 50 to 99 of a JSON file, FILE:50- those from 50 on,
     FILE:0-/2 every second."""
     sets: tuple[str, ...] = ()
-    """Floors that are kept for judging: offices (20 office floors), dead_ends (20 homes whose rooms and doors make a
-    tree)."""
+    """Floors that are kept for judging, 20 of each: offices, dead_ends (homes whose rooms and doors make a tree) and
+    narrow (homes with thick walls, narrow doors and gaps that no robot fits through)."""
     homes: int | None = None
     """Generated homes; 200 by default, none where --floorplans or --sets is given."""
     homes_seed: int = 1_000_000_000

@@ -9,10 +9,10 @@ from vinl.config.limits import Range, check_limits
 
 RANGES = {
     "area": (30.0, 1000.0),
-    "door_width": (0.75, 2.0),
+    "door_width": (0.6, 2.0),
     "door_height": (1.8, 3.0),
     "wall_height": (2.0, 6.0),
-    "inner_wall": (0.05, 0.3),
+    "inner_wall": (0.05, 0.6),
     "outer_wall": (0.05, 0.6),
     "corridor_width": (1.0, 3.0),
     "furniture_density": (0.0, 2.0),
@@ -20,9 +20,15 @@ RANGES = {
 """What each range of ``HomeConfig`` may lie in."""
 
 
-LAYOUTS = ("home", "dead_ends", "office")
+LAYOUTS = ("home", "dead_ends", "office", "narrow")
 """What generated floors are: homes; homes whose rooms and doors make a tree, so that one leaves most rooms by the door
-that one came in by; office floors."""
+that one came in by; office floors; homes with thick walls, narrow doors, and gaps that are too narrow for a robot."""
+
+CORRIDOR = 0.75
+"""Of a corridor its walls leave at least so much [m]."""
+
+WIDE = 0.75
+"""Doors that are as wide are found on coarse cells too [m]."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,8 @@ class HomeConfig:
         furniture_density: how full rooms are; 0 is bare, 1 as lived in, above 1 crowded.
         bare_share: fraction of homes without furniture, walls only.
         askew_share: probability that a piece of furniture stands turned or in the way instead of at its wall.
+        gaps: passages for each 100 m2 that something in the way narrows to less than a robot needs, where there is
+            another way.
     """
 
     layout: str = "home"
@@ -68,21 +76,42 @@ class HomeConfig:
     furniture_density: Range = (0.4, 1.7)
     bare_share: float = 0.06
     askew_share: float = 0.1
+    gaps: float = 0.0
 
     def __post_init__(self) -> None:
         if self.layout not in LAYOUTS:
             raise InputError(f"homes: layout must be one of {', '.join(LAYOUTS)}, got {self.layout!r}")
-        check_limits(self, "homes: ", **RANGES, **{name: (0.0, 1.0) for name in vars(self) if name.endswith("_share")})
+        check_limits(
+            self,
+            "homes: ",
+            gaps=(0.0, 50.0),
+            **RANGES,
+            **{name: (0.0, 1.0) for name in vars(self) if name.endswith("_share")},
+        )
         if self.area[1] < 1.05 * self.area[0]:
             raise InputError(f"homes: area needs some room between least and most, got {self.area}")
         if self.door_height[1] > self.wall_height[0]:
             raise InputError("homes: the highest door must not be higher than the lowest wall")
-        if self.corridor_width[0] - max(self.inner_wall[1], self.outer_wall[1]) < RANGES["door_width"][0]:
-            raise InputError(f"homes: a corridor less its walls must be {RANGES['door_width'][0]:g} m wide or more")
+        if self.corridor_width[0] - max(self.inner_wall[1], self.outer_wall[1]) < CORRIDOR:
+            raise InputError(f"homes: a corridor less its walls must be {CORRIDOR:g} m wide or more")
+
+    @property
+    def has_narrow_doors(self) -> bool:
+        """Whether doors may be so narrow that paths have to be checked on fine cells."""
+        return self.door_width[0] < WIDE
 
 
 _OWN = {
     "dead_ends": {"area": (80.0, 300.0)},
+    "narrow": {
+        "door_width": (0.6, 0.95),
+        "inner_wall": (0.08, 0.6),
+        "outer_wall": (0.15, 0.6),
+        "corridor_width": (1.35, 2.2),
+        "loop_share": 0.9,
+        "bare_share": 0.2,
+        "gaps": 6.0,
+    },
     "office": {
         "area": (150.0, 600.0),
         "corridor_width": (1.4, 2.6),

@@ -21,9 +21,11 @@ from vinl.world.floorplan import (
     frame_around,
     measure_clearance,
 )
+from vinl.world.free_space import FIT_RADIUS
 from vinl.world.grid import GridFrame
 from vinl.world.homes.config import HomeConfig, layout_config
 from vinl.world.homes.furnish import Piece, furnish
+from vinl.world.homes.gaps import narrow_passages
 from vinl.world.homes.rooms import Rect, Room, draw_office, draw_rooms, measure
 from vinl.world.homes.walls import Shell, raise_shell
 from vinl.world.raster import find_cells, label_regions, paint_boxes
@@ -33,7 +35,8 @@ CHECKED_AT = 0.1
 
 CHECKED_RADIUS = 0.349
 """Radius that paths are checked for on the coarse cells [m]. Straight gaps of seven cells pass, so every door does;
-between corners, of which the cells may miss the tips, it leaves room for ``free_space.FIT_RADIUS``."""
+between corners, of which the cells may miss the tips, it leaves room for ``free_space.FIT_RADIUS``. Where doors are
+narrower than that, paths are checked for ``FIT_RADIUS`` on the plan's own cells."""
 
 POCKET = 0.25
 """Floor cut off from the rest that is let be [m2]: the spot behind an open bedside."""
@@ -49,7 +52,7 @@ def keep_connected(
     rooms: list[Room], walls: Boxes, pieces: list[Piece], inside: Bool[np.ndarray, "rows columns"], frame: GridFrame
 ) -> list[Piece] | None:
     """The pieces that may stay, so that a robot of ``FIT_RADIUS`` reaches every room, and all floor but pockets; None
-    if the rooms are not connected even without furniture. ``inside`` is the floor on a frame of ``CHECKED_AT``."""
+    if the rooms are not connected even without furniture. ``inside`` is the floor on the cells that are checked."""
     floor = inside & ~paint_boxes(walls.below(BODY_HEIGHT), frame)
     cells = _find_low(pieces, frame)
     windows = [_window(rect, frame) for room in rooms for rect in room.rects]
@@ -73,11 +76,39 @@ def keep_connected(
             if attempt >= ROUNDS // 2 or not islands:
                 gone |= set(inner) if attempt >= ROUNDS // 2 else set(inner[-1:])
         if bad:
-            gone |= _blame(regions, main, bad, cells, kept, pieces)
+            gone |= _blame(regions, main, bad, cells, kept, pieces, frame.resolution)
         if not gone:
             return None if lost else [pieces[k] for k in sorted(kept)]
         kept -= gone
     return [] if _find_reached(floor, frame, windows, owners)[3] == set(owners) else None
+
+
+def add_gaps(
+    rng: Random,
+    rooms: list[Room],
+    walls: Boxes,
+    pieces: list[Piece],
+    inside: Bool[np.ndarray, "rows columns"],
+    frame: GridFrame,
+    density: float,
+) -> list[Piece]:
+    """What narrows passages, ``density`` for each 100 m2; all that a robot reaches without it is reached with it."""
+    free = inside & ~paint_boxes(walls.below(BODY_HEIGHT), frame)
+    for cells in _find_low(pieces, frame):
+        free.flat[cells] = False
+    windows = [_window(rect, frame) for room in rooms for rect in room.rects]
+    owners = [k for k, room in enumerate(rooms) for _ in room.rects]
+
+    def measure_reach(floor: Bool[np.ndarray, "rows columns"]) -> tuple[set[int], int]:
+        _, sizes, main, reached = _find_reached(floor, frame, windows, owners)
+        pockets = int((np.delete(sizes, main) * frame.resolution**2 >= POCKET).sum())
+        return reached, pockets
+
+    before = measure_reach(free)
+    wanted = density * free.sum() * frame.resolution**2 / 100
+    count = int(wanted + rng.random())
+    rows = narrow_passages(rng, free, frame, count, _radius(frame), lambda floor: measure_reach(floor) == before)
+    return [Piece(0, [row]) for row in rows]
 
 
 def paint_rects(rects: list[Rect], frame: GridFrame) -> Bool[np.ndarray, "rows columns"]:
@@ -108,10 +139,12 @@ def _find_low(pieces: list[Piece], frame: GridFrame) -> list[np.ndarray]:
     return [np.concatenate(part) for part in parts]
 
 
-def _blame(regions: np.ndarray, main: int, bad: set[int], cells: list, kept: set[int], pieces: list[Piece]) -> set[int]:
+def _blame(
+    regions: np.ndarray, main: int, bad: set[int], cells: list, kept: set[int], pieces: list[Piece], resolution: float
+) -> set[int]:
     """For each region that is cut off, the piece to take away: one that lies between it and others."""
     steps, (rows, columns) = distance_transform_edt(regions == 0, return_indices=True)  # type: ignore[misc]
-    nearest = np.where(steps < BETWEEN / CHECKED_AT, regions[rows, columns], 0)
+    nearest = np.where(steps < BETWEEN / resolution, regions[rows, columns], 0)
     beside = {k: set(nearest.flat[cells[k]].tolist()) - {0} for k in kept}
     gone: set[int] = set()
     for region in bad:
@@ -123,11 +156,16 @@ def _blame(regions: np.ndarray, main: int, bad: set[int], cells: list, kept: set
     return gone
 
 
+def _radius(frame: GridFrame) -> float:
+    """Radius that paths are checked for on such cells [m]."""
+    return CHECKED_RADIUS if frame.resolution == CHECKED_AT else FIT_RADIUS
+
+
 def _find_reached(
     free: np.ndarray, frame: GridFrame, windows: list[tuple[slice, slice]], owners: list[int]
 ) -> tuple[np.ndarray, np.ndarray, int, set[int]]:
     """The regions that a robot can walk in, their sizes, the largest of them (0: none), and the rooms in it."""
-    regions = label_regions(measure_clearance(free, frame.resolution) >= CHECKED_RADIUS)
+    regions = label_regions(measure_clearance(free, frame.resolution) >= _radius(frame))
     sizes = np.bincount(regions.ravel())
     sizes[0] = 0
     main = int(sizes.argmax())
@@ -164,12 +202,15 @@ def generate_home(seed: int, config: HomeConfig | None = None, resolution: float
         rects = [rect for room in shell.rooms for rect in room.rects]
         corners = np.array(rects)
         low, high = corners[:, :2].min(0), corners[:, 2:].max(0)
-        frame = frame_around(low, high, name, CHECKED_AT)
+        checked = RESOLUTION if config.has_narrow_doors else CHECKED_AT
+        frame = frame_around(low, high, name, checked)
         inside = paint_rects(rects, frame)
         pieces = keep_connected(shell.rooms, walls, furnish(rng, shell, config), inside, frame)
         if pieces is None:
             continue
-        if resolution != CHECKED_AT:
+        if config.gaps:
+            pieces += add_gaps(rng, shell.rooms, walls, pieces, inside, frame, config.gaps)
+        if resolution != checked:
             frame = frame_around(low, high, name, resolution)
             inside = paint_rects(rects, frame)
         furniture = Boxes(np.array([row for piece in pieces for row in piece.rows]).reshape(-1, 7))
@@ -210,8 +251,13 @@ class JudgingSet:
         return [generate_home(seed, config) for seed in range(self.first_seed, self.first_seed + self.count)]
 
 
-JUDGING_SETS = {"offices": JudgingSet("office", 2_000_000_000), "dead_ends": JudgingSet("dead_ends", 2_100_000_000)}
-"""20 office floors, and 20 homes whose rooms and doors make a tree."""
+JUDGING_SETS = {
+    "offices": JudgingSet("office", 2_000_000_000),
+    "dead_ends": JudgingSet("dead_ends", 2_100_000_000),
+    "narrow": JudgingSet("narrow", 2_200_000_000),
+}
+"""20 office floors, 20 homes whose rooms and doors make a tree, and 20 with thick walls, narrow doors and gaps that a
+robot does not fit through."""
 
 
 def find_judging_set(name: str) -> JudgingSet:
