@@ -76,5 +76,5 @@ def _describe(value: Any) -> Any:
     kind = type(value)
     is_array = _arrays.get(kind)
     if is_array is None:  # asked once: a look for an attribute that is not there takes longer than all the rest
-        is_array = _arrays[kind] = hasattr(kind, "shape") and hasattr(kind, "dtype")
+        is_array = _arrays[kind] = isinstance(getattr(value, "shape", None), tuple) and hasattr(value, "dtype")
     return (kind, value.shape, value.dtype) if is_array else kind
