@@ -2,6 +2,7 @@ import pytest
 
 from vinl.cli.plans import main
 from vinl.config.errors import InputError
+from vinl.world.readers import load_floorplan
 
 
 def test_list_names_the_shipped_plans(capsys):
@@ -49,8 +50,21 @@ def test_generate_writes_homes_that_are_read_again(tmp_path, capsys):
     assert '"furniture": []' in (out / "home-7.json").read_text()
 
 
+def test_a_layout_has_sizes_of_its_own(tmp_path):
+    assert main(["generate", "--layout", "office", "--count", "1", "--out", str(tmp_path), "--no-picture"]) == 0
+    assert load_floorplan(str(tmp_path / "home-0.json")).inside.sum() * 0.05**2 > 0.8 * 150.0
+
+
 @pytest.mark.parametrize(
-    "more", [["--count", "0"], ["--seed", "-1"], ["--set", "aera=[45,70]"], ["--set", "area=[5,6]"]]
+    "more",
+    [
+        ["--count", "0"],
+        ["--seed", "-1"],
+        ["--set", "aera=[45,70]"],
+        ["--set", "area=[5,6]"],
+        ["--layout", "castle"],
+        ["--layout", "office", "--config", "homes.yaml"],
+    ],
 )
 def test_bad_options_of_generate_are_explained(tmp_path, more):
     with pytest.raises(InputError):

@@ -50,8 +50,12 @@ class GeneratePlans:
     """How many homes."""
     seed: int = 0
     """Seed of the first home; the others follow. The same seed gives the same home."""
+    layout: str = "home"
+    """What floors: home, dead_ends (rooms and doors make a tree), office, or narrow (thick walls, narrow doors, gaps
+    that no robot fits through)."""
     config: Path | None = None
-    """YAML file of what homes are like (area, door_width, furniture_density, ...: see docs/floorplans.md)."""
+    """YAML file of what homes are like (area, door_width, furniture_density, ...: see docs/floorplans.md), in place of
+    --layout."""
     no_picture: bool = False
     """Leave contact.png away, a picture of the first 100 homes."""
 
@@ -91,9 +95,10 @@ def _list_plans() -> None:
 
 
 def _generate_plans(options: GeneratePlans) -> None:
-    from vinl.config.loader import build_config, load_config
+    from vinl.config.loader import build_config, dump_config, load_config
     from vinl.world.drawing import save_contact_sheet
     from vinl.world.homes import HomeConfig, generate_home
+    from vinl.world.homes.config import layout_config
     from vinl.world.readers.own import write_floorplan
 
     if options.count < 1:
@@ -101,7 +106,9 @@ def _generate_plans(options: GeneratePlans) -> None:
     if options.seed < 0:
         raise InputError(f"--seed {options.seed}: give a number, 0 or more")
     if options.config is None:
-        config = build_config(HomeConfig, {}, options.overrides)
+        config = build_config(HomeConfig, dump_config(layout_config(options.layout)), options.overrides)
+    elif options.layout != "home":
+        raise InputError("--config names what homes are like, and so does --layout; give one of them")
     else:
         config = load_config(HomeConfig, options.config, options.overrides)
     plans = [generate_home(options.seed + k, config) for k in range(options.count)]
