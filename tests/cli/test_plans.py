@@ -63,6 +63,7 @@ def test_a_layout_has_sizes_of_its_own(tmp_path):
         ["--set", "aera=[45,70]"],
         ["--set", "area=[5,6]"],
         ["--layout", "castle"],
+        ["--set", "layout=office"],
         ["--layout", "office", "--config", "homes.yaml"],
     ],
 )

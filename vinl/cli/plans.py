@@ -111,6 +111,8 @@ def _generate_plans(options: GeneratePlans) -> None:
         raise InputError("--config names what homes are like, and so does --layout; give one of them")
     else:
         config = load_config(HomeConfig, options.config, options.overrides)
+    if options.config is None and config.layout != options.layout:
+        raise InputError(f"layout={config.layout}: give --layout {config.layout}, which has sizes of its own")
     plans = [generate_home(options.seed + k, config) for k in range(options.count)]
     for plan in plans:
         write_floorplan(plan, options.out / f"{plan.name}.json")

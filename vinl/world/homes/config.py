@@ -24,11 +24,8 @@ LAYOUTS = ("home", "dead_ends", "office", "narrow")
 """What generated floors are: homes; homes whose rooms and doors make a tree, so that one leaves most rooms by the door
 that one came in by; office floors; homes with thick walls, narrow doors, and gaps that are too narrow for a robot."""
 
-CORRIDOR = 0.75
-"""Of a corridor its walls leave at least so much [m]."""
-
 WIDE = 0.75
-"""Doors that are as wide are found on coarse cells too [m]."""
+"""Corridors leave at least so much between their walls; doors that do are found on coarse cells too [m]."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +89,8 @@ class HomeConfig:
             raise InputError(f"homes: area needs some room between least and most, got {self.area}")
         if self.door_height[1] > self.wall_height[0]:
             raise InputError("homes: the highest door must not be higher than the lowest wall")
-        if self.corridor_width[0] - max(self.inner_wall[1], self.outer_wall[1]) < CORRIDOR:
-            raise InputError(f"homes: a corridor less its walls must be {CORRIDOR:g} m wide or more")
+        if self.corridor_width[0] - max(self.inner_wall[1], self.outer_wall[1]) < WIDE:
+            raise InputError(f"homes: a corridor less its walls must be {WIDE:g} m wide or more")
 
     @property
     def has_narrow_doors(self) -> bool:

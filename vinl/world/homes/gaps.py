@@ -32,8 +32,8 @@ UPRIGHT = 0.3
 TRIES = 12
 """Places tried for each."""
 
-POCKET = 0.1
-"""Smaller parts of the floor do not count [m2]."""
+SPECK = 0.1
+"""Smaller parts of the floor about a gap do not count [m2]."""
 
 AROUND = 1.5
 """The floor within this of a gap falls apart with it [m]."""
@@ -117,6 +117,6 @@ def _part(
     cut = free[low[0] : high[0] + 1, low[1] : high[1] + 1]
     parts = label_regions(measure_clearance(cut, frame.resolution) >= radius)
     sizes = np.bincount(parts.ravel(), minlength=1)[1:]
-    found = [k for k in np.argsort(-sizes) if sizes[k] * frame.resolution**2 >= POCKET]
+    found = [k for k in np.argsort(-sizes) if sizes[k] * frame.resolution**2 >= SPECK]
     cells = np.array([np.argwhere(parts == k + 1)[0] for k in found], dtype=int).reshape(-1, 2)
     return frame.xy(low + cells)

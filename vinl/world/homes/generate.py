@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from random import Random
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 from scipy.ndimage import distance_transform_edt
 
 from vinl.config.errors import InputError
@@ -48,25 +48,57 @@ ROUNDS = 12
 """Pieces are taken away so many times at most; then the home is left bare."""
 
 
-def keep_connected(
-    rooms: list[Room], walls: Boxes, pieces: list[Piece], inside: Bool[np.ndarray, "rows columns"], frame: GridFrame
-) -> list[Piece] | None:
-    """The pieces that may stay, so that a robot of ``FIT_RADIUS`` reaches every room, and all floor but pockets; None
-    if the rooms are not connected even without furniture. ``inside`` is the floor on the cells that are checked."""
-    floor = inside & ~paint_boxes(walls.below(BODY_HEIGHT), frame)
-    cells = _find_low(pieces, frame)
-    windows = [_window(rect, frame) for room in rooms for rect in room.rects]
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """The rooms of a home between its walls, on the cells that paths are checked on.
+
+    Attributes:
+        free: what walls leave.
+        windows, owners: the cells of each rectangle of a room, and the number of its room.
+        radius: that paths are checked for [m].
+    """
+
+    free: Bool[np.ndarray, "rows columns"]
+    frame: GridFrame
+    windows: list[tuple[slice, slice]]
+    owners: list[int]
+    radius: float
+
+    def find_reached(self, free: Bool[np.ndarray, "rows columns"]) -> tuple[np.ndarray, np.ndarray, int, set[int]]:
+        """The regions that a robot can walk in, their sizes [cells], the largest of them (0: none), and the rooms in
+        it."""
+        regions = label_regions(measure_clearance(free, self.frame.resolution) >= self.radius)
+        sizes = np.bincount(regions.ravel())
+        sizes[0] = 0
+        main = int(sizes.argmax())
+        windows = zip(self.owners, self.windows, strict=True)
+        return regions, sizes, main, {k for k, where in windows if main and (regions[where] == main).any()}
+
+
+def lay_floor(rooms: list[Room], walls: Boxes, name: str, config: HomeConfig) -> Floor:
+    """The floor of a home without furniture."""
+    rects = [rect for room in rooms for rect in room.rects]
+    cell, radius = (RESOLUTION, FIT_RADIUS) if config.has_narrow_doors else (CHECKED_AT, CHECKED_RADIUS)
+    frame = frame_around(*_bound(rects), name, cell)
+    free = paint_rects(rects, frame) & ~paint_boxes(walls.below(BODY_HEIGHT), frame)
     owners = [k for k, room in enumerate(rooms) for _ in room.rects]
-    kept = set(range(len(pieces)))
+    return Floor(free, frame, [_window(rect, frame) for rect in rects], owners, radius)
+
+
+def keep_connected(floor: Floor, pieces: list[Piece]) -> list[Piece] | None:
+    """The pieces that may stay, so that a robot of ``FIT_RADIUS`` reaches every room, and all floor but pockets; None
+    if the rooms are not connected even without furniture."""
+    cells, windows, owners = _find_low(pieces, floor.frame), floor.windows, floor.owners
+    rooms, kept = set(owners), set(range(len(pieces)))
     for attempt in range(ROUNDS + 1):
-        free = floor.copy()
+        free = floor.free.copy()
         for k in kept:
             free.flat[cells[k]] = False
-        regions, sizes, main, reached = _find_reached(free, frame, windows, owners)
+        regions, sizes, main, reached = floor.find_reached(free)
         if not main:
             return None
-        lost = set(range(len(rooms))) - reached
-        bad = {int(k) for k in np.flatnonzero(sizes * frame.resolution**2 >= POCKET)} - {main}
+        lost = rooms - reached
+        bad = {int(k) for k in np.flatnonzero(sizes * floor.frame.resolution**2 >= POCKET)} - {main}
         gone: set[int] = set()
         for room in lost:
             inner = [k for k in kept if pieces[k].room == room]
@@ -76,38 +108,26 @@ def keep_connected(
             if attempt >= ROUNDS // 2 or not islands:
                 gone |= set(inner) if attempt >= ROUNDS // 2 else set(inner[-1:])
         if bad:
-            gone |= _blame(regions, main, bad, cells, kept, pieces, frame.resolution)
+            gone |= _blame(regions, main, bad, cells, kept, pieces, BETWEEN / floor.frame.resolution)
         if not gone:
             return None if lost else [pieces[k] for k in sorted(kept)]
         kept -= gone
-    return [] if _find_reached(floor, frame, windows, owners)[3] == set(owners) else None
+    return [] if floor.find_reached(floor.free)[3] == rooms else None
 
 
-def add_gaps(
-    rng: Random,
-    rooms: list[Room],
-    walls: Boxes,
-    pieces: list[Piece],
-    inside: Bool[np.ndarray, "rows columns"],
-    frame: GridFrame,
-    density: float,
-) -> list[Piece]:
+def add_gaps(rng: Random, floor: Floor, pieces: list[Piece], density: float) -> list[Piece]:
     """What narrows passages, ``density`` for each 100 m2; all that a robot reaches without it is reached with it."""
-    free = inside & ~paint_boxes(walls.below(BODY_HEIGHT), frame)
-    for cells in _find_low(pieces, frame):
+    free, cell = floor.free.copy(), floor.frame.resolution**2
+    for cells in _find_low(pieces, floor.frame):
         free.flat[cells] = False
-    windows = [_window(rect, frame) for room in rooms for rect in room.rects]
-    owners = [k for k, room in enumerate(rooms) for _ in room.rects]
 
-    def measure_reach(floor: Bool[np.ndarray, "rows columns"]) -> tuple[set[int], int]:
-        _, sizes, main, reached = _find_reached(floor, frame, windows, owners)
-        pockets = int((np.delete(sizes, main) * frame.resolution**2 >= POCKET).sum())
-        return reached, pockets
+    def measure_reach(left: Bool[np.ndarray, "rows columns"]) -> tuple[set[int], int]:
+        _, sizes, main, reached = floor.find_reached(left)
+        return reached, int((np.delete(sizes, main) * cell >= POCKET).sum())
 
     before = measure_reach(free)
-    wanted = density * free.sum() * frame.resolution**2 / 100
-    count = int(wanted + rng.random())
-    rows = narrow_passages(rng, free, frame, count, _radius(frame), lambda floor: measure_reach(floor) == before)
+    count = int(density * free.sum() * cell / 100 + rng.random())
+    rows = narrow_passages(rng, free, floor.frame, count, floor.radius, lambda left: measure_reach(left) == before)
     return [Piece(0, [row]) for row in rows]
 
 
@@ -117,6 +137,12 @@ def paint_rects(rects: list[Rect], frame: GridFrame) -> Bool[np.ndarray, "rows c
     for rect in rects:
         grid[_window(rect, frame)] = True
     return grid
+
+
+def _bound(rects: list[Rect]) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]:
+    """The lowest and the highest corner of all [m]."""
+    corners = np.array(rects)
+    return corners[:, :2].min(0), corners[:, 2:].max(0)
 
 
 def _window(rect: Rect, frame: GridFrame) -> tuple[slice, slice]:
@@ -140,11 +166,12 @@ def _find_low(pieces: list[Piece], frame: GridFrame) -> list[np.ndarray]:
 
 
 def _blame(
-    regions: np.ndarray, main: int, bad: set[int], cells: list, kept: set[int], pieces: list[Piece], resolution: float
+    regions: np.ndarray, main: int, bad: set[int], cells: list, kept: set[int], pieces: list[Piece], reach: float
 ) -> set[int]:
-    """For each region that is cut off, the piece to take away: one that lies between it and others."""
+    """For each region that is cut off, the piece to take away: one that lies between it and others, ``reach`` cells
+    from both at most."""
     steps, (rows, columns) = distance_transform_edt(regions == 0, return_indices=True)  # type: ignore[misc]
-    nearest = np.where(steps < BETWEEN / resolution, regions[rows, columns], 0)
+    nearest = np.where(steps < reach, regions[rows, columns], 0)
     beside = {k: set(nearest.flat[cells[k]].tolist()) - {0} for k in kept}
     gone: set[int] = set()
     for region in bad:
@@ -154,23 +181,6 @@ def _blame(
             # chairs go before tables, small things before large ones
             gone.add(min(between, key=lambda k: (pieces[k].chief, len(cells[k]), k)))
     return gone
-
-
-def _radius(frame: GridFrame) -> float:
-    """Radius that paths are checked for on such cells [m]."""
-    return CHECKED_RADIUS if frame.resolution == CHECKED_AT else FIT_RADIUS
-
-
-def _find_reached(
-    free: np.ndarray, frame: GridFrame, windows: list[tuple[slice, slice]], owners: list[int]
-) -> tuple[np.ndarray, np.ndarray, int, set[int]]:
-    """The regions that a robot can walk in, their sizes, the largest of them (0: none), and the rooms in it."""
-    regions = label_regions(measure_clearance(free, frame.resolution) >= _radius(frame))
-    sizes = np.bincount(regions.ravel())
-    sizes[0] = 0
-    main = int(sizes.argmax())
-    rooms = {k for k, where in zip(owners, windows, strict=True) if main and (regions[where] == main).any()}
-    return regions, sizes, main, rooms
 
 
 ATTEMPTS = 100
@@ -199,20 +209,15 @@ def generate_home(seed: int, config: HomeConfig | None = None, resolution: float
     for _ in range(ATTEMPTS):
         shell = draw_shell(rng, config)
         walls = Boxes(np.array(shell.walls))
-        rects = [rect for room in shell.rooms for rect in room.rects]
-        corners = np.array(rects)
-        low, high = corners[:, :2].min(0), corners[:, 2:].max(0)
-        checked = RESOLUTION if config.has_narrow_doors else CHECKED_AT
-        frame = frame_around(low, high, name, checked)
-        inside = paint_rects(rects, frame)
-        pieces = keep_connected(shell.rooms, walls, furnish(rng, shell, config), inside, frame)
+        floor = lay_floor(shell.rooms, walls, name, config)
+        pieces = keep_connected(floor, furnish(rng, shell, config))
         if pieces is None:
             continue
         if config.gaps:
-            pieces += add_gaps(rng, shell.rooms, walls, pieces, inside, frame, config.gaps)
-        if resolution != checked:
-            frame = frame_around(low, high, name, resolution)
-            inside = paint_rects(rects, frame)
+            pieces += add_gaps(rng, floor, pieces, config.gaps)
+        rects = [rect for room in shell.rooms for rect in room.rects]
+        frame = frame_around(*_bound(rects), name, resolution)
+        inside = paint_rects(rects, frame)
         furniture = Boxes(np.array([row for piece in pieces for row in piece.rows]).reshape(-1, 7))
         panes = Boxes(np.array(shell.panes).reshape(-1, 7))
         middles = [(room.kind, max(room.rects, key=measure)) for room in shell.rooms]
