@@ -11,7 +11,7 @@ import yaml
 from tiny_networks import TinyGuide, TinyWalker
 
 from vinl.benchmark.evaluate import evaluate
-from vinl.benchmark.protocol import place_route, read_routes
+from vinl.benchmark.routes import place_route, read_routes
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.cli.app import main

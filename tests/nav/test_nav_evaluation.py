@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from vinl.benchmark.protocol import place_route
+from vinl.benchmark.routes import place_route
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_routes
 from vinl.chain.metrics import spl

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vinl
-from vinl.benchmark.journal import RECORDINGS, Recordings, find_recording, read_recording, write_recording
+from vinl.benchmark.recordings import RECORDINGS, Recordings, find_recording, read_recording, write_recording
 from vinl.cli.app import main
 from vinl.config.errors import InputError
 from vinl.viewer.replay import Replay

@@ -16,14 +16,7 @@ from typing import Any
 import numpy as np
 
 from vinl.benchmark.cluster import join_cluster
-from vinl.benchmark.journal import (
-    Journal,
-    forget_recordings,
-    missing_recordings,
-    read_wall_seconds,
-    without_poses,
-    write_recording,
-)
+from vinl.benchmark.journal import Journal, read_wall_seconds
 from vinl.benchmark.metrics import aggregate_episodes
 from vinl.benchmark.protocol import (
     Films,
@@ -37,6 +30,7 @@ from vinl.benchmark.protocol import (
     missing_films,
     run_job,
 )
+from vinl.benchmark.recordings import forget_recordings, missing_recordings, without_poses, write_recording
 from vinl.chain.choose import check_cameras, check_locomotion_policy, choose_locomotor, choose_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.navigators.base import ORACLE, Navigator

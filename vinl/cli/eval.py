@@ -99,7 +99,8 @@ def main(argv: list[str]) -> int:
     with kept_imports():
         from vinl.benchmark.evaluate import check_numbers, name_apart
         from vinl.benchmark.folders import check_folder
-        from vinl.benchmark.protocol import Films, Protocol, read_routes
+        from vinl.benchmark.protocol import Films, Protocol
+        from vinl.benchmark.routes import read_routes
         from vinl.chain.choose import best_locomotor, best_navigator
         from vinl.config.output import check_out, strip_command
         from vinl.world.readers import load_floorplans

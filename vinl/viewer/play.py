@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vinl.benchmark.journal import Recordings
+from vinl.benchmark.recordings import Recordings
 from vinl.chain.choose import best_locomotor, best_navigator
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.navigators.base import ORACLE, Navigator

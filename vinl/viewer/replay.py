@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from vinl.benchmark.journal import Recordings
+from vinl.benchmark.recordings import Recordings
 from vinl.chain.depth_cameras import DepthCameras, open_depth_cameras
 from vinl.config.errors import InputError
 from vinl.render.video import POSE_DT, count_steps
