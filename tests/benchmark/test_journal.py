@@ -1,6 +1,7 @@
 """What is kept of an evaluation that was interrupted, and what is refused."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -134,6 +135,16 @@ def test_a_broken_line_is_named(folder: Path, two_rooms: FloorPlan, trotting: Lo
     lines = (folder / EPISODES).read_bytes().splitlines(keepends=True)
     (folder / EPISODES).write_bytes(lines[0] + b'{"record": {}}\n' + lines[1])
     with pytest.raises(InputError, match="line 2 is broken"):
+        run(two_rooms, trotting, folder)
+
+
+@pytest.mark.parametrize("wrong", ['"0.5"', '"NaN"', "true", "null", "1e99", "[0.5]"])
+def test_a_figure_that_is_no_number_is_named(
+    wrong: str, folder: Path, two_rooms: FloorPlan, trotting: LocomotionPolicy
+) -> None:
+    text = (folder / EPISODES).read_text()
+    (folder / EPISODES).write_text(re.sub(r'"spl": [^,]+', f'"spl": {wrong}', text, count=1))
+    with pytest.raises(InputError, match=r"line 2 is broken \(spl is "):
         run(two_rooms, trotting, folder)
 
 

@@ -100,7 +100,7 @@ def test_same_seed_same_episode() -> None:
 
 def test_oracle_walks_the_episode_that_evaluate_walks() -> None:
     plan = vinl.load_floorplan(PLAN)
-    results = vinl.evaluate([plan], "teacher", StepwiseOracle(), 1, 1, 2, obstacles="paper", config=NEAR)
+    results = vinl.evaluate([plan], "teacher", StepwiseOracle(), 1, 1, first_seed=2, obstacles="paper", config=NEAR)
     env = HomeEnv(floorplans=plan, locomotor="teacher", rules=NEAR, overrides=["reward.scale=1.0"])
     _, info = env.reset(seed=0, options={"episode": 0, "seed": 2})
     oracle, rewards, over, out = OracleNavigator(NEAR.oracle), [], False, False

@@ -51,7 +51,7 @@ def test_plan_is_a_picture_that_shows_the_clutter() -> None:
 
 def test_walk_is_the_episode_of_an_evaluation(walk: vinl.Walk) -> None:
     plan = vinl.load_floorplan(PLAN)
-    results = vinl.evaluate([plan], "rough", "oracle", 2, 1, 3, obstacles="paper", config=SHORT)
+    results = vinl.evaluate([plan], "rough", "oracle", 2, 1, first_seed=3, obstacles="paper", config=SHORT)
     assert results.records[1] == walk.record
     assert len(walk.trace.poses) == 50 and len(walk.blocks) == walk.record.blocks > 10
 
@@ -164,24 +164,37 @@ def test_part_of_an_episode(walk: vinl.Walk) -> None:
 def test_bad_words() -> None:
     with pytest.raises(InputError, match="did you mean 'harbour_flat'"):
         vinl.walk("harbor_flat")
-    for options, words in (({"obstacles": "papr"}, "did you mean"), ({"episode": -1}, "negative")):
+    for options, words in (({"obstacles": "papr"}, "did you mean"), ({"episode": -1}, "from 0 on")):
         with pytest.raises(InputError, match=words):
             vinl.walk(PLAN, "rough", **options)
 
 
 WRONG = {
     "vinl.evaluate([3])": "a floor plan is a name, a file or a FloorPlan, got int",
+    "vinl.evaluate('harbour_flat', episodes='x')": "--episodes must be a number, got 'x'",
+    "vinl.evaluate('harbour_flat', films='first', out='/proc/films')": "nothing can be written there",
+    "vinl.walk('harbour_flat', episode='x')": "episode and seed are whole numbers from 0 on, got 'x' and 0",
+    "vinl.walk('harbour_flat', config={'time_limit': 1})": "config must be an EvaluationConfig, got dict",
+    "vinl.generate_home('x')": "the seed must be a number, got 'x'",
     "vinl.walk('harbour_flat', 'rough', print)": "as_navigator",
     "vinl.walk('harbour_flat', print)": "as_locomotor",
     "vinl.walk('harbour_flat', 'nav')": "nav is a navigation policy",
     "vinl.walk('harbour_flat', 'loco', 'loco')": "loco is a locomotion policy",
     "vinl.show_video('harbour_flat')": "what vinl.walk returns, got str",
+    "vinl.show_video(walk, 0, 'x')": "stop is a time [s], got 'x'",
+    "walk.see('navigation')": "time is seconds since the start, got 'navigation'",
 }
 
 
 def test_wrong_kinds_are_explained() -> None:
     """In a process of its own: here every argument's type is checked, which a user's process does not do."""
-    code = "import vinl\nfor call in {}:\n  try:\n    eval(call)\n  except vinl.InputError as error:\n    print(error)"
+    code = """import vinl
+walk = vinl.walk("harbour_flat", "rough", "oracle", config=vinl.EvaluationConfig(time_limit=0.5))
+for call in {}:
+    try:
+        eval(call)
+    except vinl.InputError as error:
+        print(error)"""
     command = [sys.executable, "-c", code.format(list(WRONG))]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     lines = done.stdout.splitlines()

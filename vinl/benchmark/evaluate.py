@@ -32,7 +32,7 @@ from vinl.benchmark.protocol import (
 )
 from vinl.benchmark.recordings import forget_recordings, missing_recordings, without_poses, write_recording
 from vinl.chain.choose import check_cameras, check_locomotion_policy, choose_locomotor, choose_navigator
-from vinl.chain.config import EvaluationConfig
+from vinl.chain.config import EvaluationConfig, choose_rules
 from vinl.chain.navigators.base import ORACLE, Navigator
 from vinl.chain.navigators.learned import LearnedNavigator
 from vinl.chain.navigators.oracle import OracleNavigator
@@ -41,7 +41,7 @@ from vinl.chain.records import Episode, Key, Results
 from vinl.chain.workers import WorkerPool, show_line
 from vinl.config.errors import InputError
 from vinl.config.limits import check_number
-from vinl.config.output import list_packages
+from vinl.config.output import check_out, list_packages
 from vinl.policies.identity import describe_policy
 from vinl.policies.policy import Policy
 from vinl.render.video import FilmJob, name_film
@@ -146,8 +146,9 @@ def evaluate(
     navigator: str | Path | Navigator | None = None,
     episodes: int = 10,
     seeds: int = 5,
-    first_seed: int = 0,
+    *,
     obstacles: str = "paper",
+    first_seed: int = 0,
     config: EvaluationConfig | None = None,
     workers: int = 1,
     films: Films = "none",
@@ -167,8 +168,8 @@ def evaluate(
             with more than one worker; ``nav`` by default.
         episodes: start/goal pairs a plan; the same for all seeds.
         seeds: repetitions; a seed changes clutter, heading and joint angles at the start.
-        first_seed: the first of them.
         obstacles: clutter preset.
+        first_seed: the first of the repetitions.
         config: limits and rules; the paper's by default.
         workers: processes.
         films: which episodes are filmed: none, the first of every plan, or all of the first seed.
@@ -182,7 +183,7 @@ def evaluate(
         InputError: a name is unknown, a number is out of range, a plan has no room for an episode, or the cluster
             cannot be reached.
     """
-    config = config or EvaluationConfig()
+    config = choose_rules(config)
     opened = open_floorplans(floorplans)
     if not opened:
         raise InputError("no floor plan to walk through; give at least one")
@@ -193,7 +194,7 @@ def evaluate(
     check_numbers(episodes, seeds, first_seed, obstacles, workers)
     row = Row(choose_locomotor(locomotor), choose_navigator(navigator, config), obstacles)
     protocol = Protocol(name_apart(opened), episodes, range(first_seed, first_seed + seeds), config, films=films)
-    folders = [None if out is None else Path(out)]
+    folders = [None if out is None else check_out(out)]
     if on_progress is not None:
         return evaluate_rows([row], protocol, workers, folders, on_progress=on_progress, cluster=cluster)[0]
     with show_line("episodes", "episodes") as show:

@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 
@@ -29,6 +29,10 @@ _SHOWN = 3
 
 _LARGEST = 1e12
 """No figure of an episode is larger."""
+
+_PLACE = tuple[float, float]
+
+_KINDS = get_type_hints(EpisodeRecord)
 
 
 class Journal:
@@ -118,15 +122,27 @@ def plain_episode(episode: Episode) -> dict[str, Any]:
 
 def build_episode(data: Mapping[str, Any]) -> Episode:
     """What ``plain_episode`` was given."""
-    record, trace = dict(data["record"]), data["trace"]
-    for name in ("start", "goal"):
-        record[name] = tuple(record[name])
-    for name, value in record.items():
-        if isinstance(value, float) and not abs(value) < _LARGEST:
-            raise ValueError(f"{name} is {value:g}")
+    trace = data["trace"]
     shapes = {"path": 2, "contacts": 4, "blocks": 6}
     parts = {name: np.array(trace[name], np.float64).reshape(-1, width) for name, width in shapes.items()}
-    return Episode(EpisodeRecord(**record), EpisodeTrace(**parts, poses=np.zeros((0, 19)), commands=np.zeros((0, 3))))
+    if not all((np.abs(part) < _LARGEST).all() for part in parts.values()):
+        raise ValueError("a place is not finite")
+    record = _build_record(data["record"])
+    return Episode(record, EpisodeTrace(**parts, poses=np.zeros((0, 19)), commands=np.zeros((0, 3))))
+
+
+def _build_record(data: Mapping[str, Any]) -> EpisodeRecord:
+    """A record of values of its own kinds: a word in place of a number would be met where figures are drawn."""
+    values = {**data, **{name: tuple(data[name]) for name in ("start", "goal")}}
+    for name, kind in ((name, kind) for name, kind in _KINDS.items() if name in values):
+        parts = values[name] if kind == _PLACE else (values[name],)
+        if kind in (float, _PLACE):
+            fits = all(type(part) in (float, int) and abs(part) < _LARGEST for part in parts)
+        else:
+            fits = type(values[name]) is kind
+        if not fits or (kind == _PLACE and len(parts) != 2):
+            raise ValueError(f"{name} is {values[name]!r}")
+    return EpisodeRecord(**values)
 
 
 def read_about(folder: Path) -> dict[str, Any]:

@@ -144,3 +144,16 @@ class EvaluationConfig:
             positive=("success_radius", "stuck_window", "min_metres", "max_tilt"),
             unsigned=("min_distance", "clearance", "joint_noise", "stuck_distance"),
         )
+
+
+def choose_rules(config: EvaluationConfig | None) -> EvaluationConfig:
+    """The rules that are given, or the paper's.
+
+    Raises:
+        InputError: they are none.
+    """
+    if config is None:
+        return EvaluationConfig()
+    if not isinstance(config, EvaluationConfig):
+        raise InputError(f"config must be an EvaluationConfig, got {type(config).__name__}; vinl.EvaluationConfig(...)")
+    return config

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Callable
 
 from vinl.config.errors import InputError
@@ -59,8 +60,10 @@ def check_number(name: str, value: float, least: float = 0.0, most: float = math
     """Hold a number to limits.
 
     Raises:
-        InputError: it leaves ``least`` to ``most``, or is not finite.
+        InputError: it is none, leaves ``least`` to ``most``, or is not finite.
     """
+    if not isinstance(value, numbers.Real):
+        raise InputError(f"{name} must be a number, got {value!r}")
     if not (math.isfinite(value) and least <= value <= most):
         raise InputError(f"{name} must lie between {least:g} and {most:g}, got {value:g}")
 

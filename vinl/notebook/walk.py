@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
+import numbers
 import shutil
 import tempfile
 import weakref
@@ -16,7 +17,7 @@ import numpy as np
 from PIL import Image
 
 from vinl.chain.choose import choose_locomotor, choose_navigator
-from vinl.chain.config import EvaluationConfig
+from vinl.chain.config import EvaluationConfig, choose_rules
 from vinl.chain.depth_cameras import open_depth_cameras
 from vinl.chain.episode import draw_routes, draw_setup
 from vinl.chain.navigators.base import Navigator
@@ -112,6 +113,8 @@ class Walk:
             InputError: the walk was over by then, or there is no such camera.
         """
         camera = self._find(camera)
+        if not isinstance(time, numbers.Real):
+            raise InputError(f"see(time, camera): time is seconds since the start, got {time!r}")
         if not 0 <= time <= self.record.time_s:
             raise InputError(f"time must lie between 0 and {self.record.time_s:g} s, got {time:g}")
         pose = self.trace.poses[min(round(time / POSE_DT), len(self.trace.poses) - 1)]
@@ -162,10 +165,10 @@ def walk(
     Raises:
         InputError: a name is unknown, or a policy answered what is no answer.
     """
-    rules, home = config or EvaluationConfig(), open_plan(plan)
+    rules, home = choose_rules(config), open_plan(plan)
     clutter = choose_clutter(obstacles, "obstacles")
-    if episode < 0 or seed < 0:
-        raise InputError(f"episode and seed must not be negative, got {episode} and {seed}")
+    if not all(isinstance(number, numbers.Integral) and number >= 0 for number in (episode, seed)):
+        raise InputError(f"episode and seed are whole numbers from 0 on, got {episode!r} and {seed!r}")
     legs, guide = choose_locomotor(locomotor), choose_navigator(navigator, rules)
     route = draw_routes(home, episode + 1, rules)[episode]
     setup = draw_setup(home, route, episode, seed, clutter, rules)
@@ -213,8 +216,9 @@ def show_video(
     """
     if not isinstance(walk, Walk):
         raise InputError(f"show_video shows what vinl.walk returns, got {type(walk).__name__}")
-    if isinstance(start, (str, Path)):
-        raise InputError(f"show_video(walk, start, stop): start is a time [s], got {start!r}; a folder is out=...")
+    for name, time in (("start", start), ("stop", stop)):
+        if time is not None and not isinstance(time, numbers.Real):
+            raise InputError(f"show_video(walk, start, stop): {name} is a time [s], got {time!r}; a folder is out=...")
     part = cut_episode(walk.episode, start, stop)
     folder = Path(tempfile.mkdtemp(prefix="vinl-film-")) if out is None else check_out(out)
     shown = Film(folder / film(FilmJob(walk.plan, part, str(folder)), walk.config), width)

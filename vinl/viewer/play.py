@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from vinl.benchmark.recordings import Recordings
 from vinl.chain.choose import best_locomotor, best_navigator
-from vinl.chain.config import EvaluationConfig
+from vinl.chain.config import EvaluationConfig, choose_rules
 from vinl.chain.navigators.base import ORACLE, Navigator
 from vinl.config.errors import InputError
 from vinl.policies.card import read_card
@@ -70,7 +70,7 @@ def play(
     require_viser("vinl.play")
     from vinl.viewer.viewer import Viewer
 
-    rules = config or EvaluationConfig()
+    rules = choose_rules(config)
     if terrain is not None and plan is not None:
         raise InputError("plan and terrain do not go together; give one of them")
     shipped = shipped_floorplans()

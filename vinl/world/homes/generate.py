@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import distance_transform_edt
 
 from vinl.config.errors import InputError
+from vinl.config.limits import check_number
 from vinl.config.loader import closest
 from vinl.world.boxes import Boxes
 from vinl.world.floorplan import (
@@ -200,10 +201,8 @@ def generate_home(seed: int, config: HomeConfig | None = None, resolution: float
         InputError: if the seed is negative, the resolution out of range, or no home fits the config.
     """
     config = config or HomeConfig()
-    if seed < 0:
-        raise InputError(f"homes: the seed must be 0 or more, got {seed}")
-    if not 0.02 <= resolution <= CHECKED_AT:
-        raise InputError(f"homes: the resolution must lie between 0.02 m and {CHECKED_AT} m, got {resolution:g}")
+    check_number("homes: the seed", seed)
+    check_number("homes: the resolution [m]", resolution, 0.02, CHECKED_AT)
     rng = Random(seed)
     name = f"home-{seed}"
     for _ in range(ATTEMPTS):
