@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,9 @@ POINT_DT = 0.2
 
 _MARGIN = 0.4
 _GRAIN = 0.02
+
+_WIDE = 40.0
+"""Maps up to this width [m] share one length of the scale bar, so that homes are compared at a glance."""
 
 
 def outline_boxes(boxes: Boxes) -> str:
@@ -108,7 +112,7 @@ def draw_map(plan: FloorPlan, episodes: Sequence[Episode], first: int, radius: f
             f'r="{LENGTH / 5:.2f}"/><circle class="goal" cx="{gx:.2f}" cy="{-gy:.2f}" r="{radius:.2f}"/>'
             f'<text x="{gx:.2f}" y="{-gy + 0.11:.2f}">{record.episode}</text></g>'
         )
-    bar = 1 if width < 15 else 5
+    bar = 2 if width <= _WIDE else 10
     bx, by = low[0] + 0.4, -low[1] + 0.15
     parts.append(
         f'<g class="scale"><path d="M{bx:.2f} {by:.2f}h{bar}"/>'
@@ -186,7 +190,9 @@ def print_fitting(console: Console, table: Table, spared: Iterable[str]) -> None
     for title in spared:
         if console.measure(table, options=console.options.update(width=1000)).maximum <= console.width:
             break
-        table.columns = [column for column in table.columns if column.header != title]
+        kept = [column for column in table.columns if column.header != title]
+        # rich pads the last column by its number: one that keeps its old one is measured too narrow and cut
+        table.columns = [replace(column, _index=k) for k, column in enumerate(kept)]
     console.print(table)
 
 
