@@ -1,5 +1,6 @@
 """Every shipped policy, and that of a run folder, becomes a file that answers as the policy does."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,6 +48,12 @@ def check(path: Path, done: Exported, name: str, steps: int):
 def test_shipped_policies(name: str):
     steps = 100 if load_policy(name).card.kind == "locomotion" else 40
     check(Path("a.onnx"), export_policy(name, "a.onnx", steps), name, steps)
+
+
+def test_a_file_is_checked_on_a_thousand_steps_unless_told_otherwise(capsys: pytest.CaptureFixture[str]):
+    assert main(["export", "rough"]) == 0
+    said = re.search(r"parity +([\d,]+) steps of .* differ by ([\d.e+-]+) at most", capsys.readouterr().out)
+    assert said is not None and said[1] == "1,000" and float(said[2]) <= LIMIT == 1e-4
 
 
 def test_loco(exported: dict[str, tuple[Path, Exported]]):
@@ -165,10 +172,11 @@ def test_rows_explain_themselves():
         ("export loco --out file/loco.onnx", "cannot write file/loco.onnx"),
         ("export loco --steps 0", "steps must be at least 1"),
         ("export --scene harbour_flt --out home", "shipped plans"),
-        ("export --scene harbour_flat --out file/home", "cannot write file/home"),
+        ("export --scene harbour_flat --out file/home", "--out file/home: file is a file"),
         ("export --scene harbour_flat --out home --obstacles some", "obstacles 'some' is not a preset"),
         ("export --scene harbour_flat --out home --episodes 0", "episodes must be at least 1"),
         ("export --scene harbour_flat --out home --seed -1", "seed must not be negative"),
+        ("export --scene harbour_flat --out home --resolution 9", "--resolution 9: give metres per pixel"),
     ],
 )
 def test_bad_input_is_one_line(argv: str, says: str, capsys: pytest.CaptureFixture[str]):

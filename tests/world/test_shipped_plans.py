@@ -1,12 +1,15 @@
+import shutil
+
 import numpy as np
 import pytest
 
 from vinl.config.errors import InputError
+from vinl.config.paths import assets_dir
 from vinl.world.boxes import Boxes
 from vinl.world.drawing import draw_floorplan, save_floorplan
 from vinl.world.free_space import FreeSpace, distance_field
 from vinl.world.raster import paint_boxes
-from vinl.world.readers import load_floorplan, load_floorplans, shipped_floorplans
+from vinl.world.readers import load_floorplan, load_floorplans, open_floorplans, shipped_floorplans
 from vinl.world.start_goal import sample_start_goals
 
 NAMES = ["family_home", "garden_bungalow", "harbour_flat", "mill_loft", "old_town"]
@@ -15,6 +18,19 @@ NAMES = ["family_home", "garden_bungalow", "harbour_flat", "mill_loft", "old_tow
 def test_there_are_five():
     assert shipped_floorplans() == NAMES
     assert [plan.name for plan in load_floorplans(["old_town", "mill_loft"])] == ["old_town", "mill_loft"]
+
+
+def test_what_is_given_twice_is_there_once(tmp_path, monkeypatch):
+    file = assets_dir() / "floorplans" / "mill_loft.json"
+    (tmp_path / "link.json").symlink_to(file)
+    copy = shutil.copy(file, tmp_path / "copy.json")
+    monkeypatch.chdir(tmp_path)
+    same = ["mill_loft", str(file), f"{file}:0", "link.json", str(tmp_path / "link.json")]
+    assert [plan.name for plan in load_floorplans(same)] == ["mill_loft"]
+    plan, other = load_floorplans(["mill_loft", str(copy)])
+    assert (plan.name, other.name) == ("mill_loft", "copy")
+    opened = open_floorplans([plan, *same, plan, file, other])
+    assert opened[0] is plan and opened[2] is other and len(opened) == 3
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -54,6 +70,7 @@ def test_plans_are_drawn(tmp_path):
     out = save_floorplan(plan, tmp_path / "deep" / "loft.png", dpi=40, start_goals=pairs, paths=[np.zeros((2, 2))])
     assert out.stat().st_size > 1000
     assert "free floor" in draw_floorplan(plan).axes[0].get_title()
+    assert plan._repr_png_().startswith(b"\x89PNG")  # what a notebook shows
     with pytest.raises(InputError, match=r"\.png"):
         save_floorplan(plan, tmp_path / "loft.txt")
     (tmp_path / "file").write_text("")

@@ -12,12 +12,10 @@ from PIL import Image
 
 from vinl.world.boxes import Blocks
 from vinl.world.clutter import ClutterPreset, choose_clutter, scatter_blocks
-from vinl.world.drawing import draw_floorplan
+from vinl.world.drawing import encode_floorplan
 from vinl.world.floorplan import FloorPlan
 from vinl.world.readers import load_floorplan
 from vinl.world.start_goal import StartGoal, sample_start_goals
-
-_DPI = 90
 
 
 def open_plan(plan: str | Path | FloorPlan) -> FloorPlan:
@@ -68,7 +66,5 @@ def draw_plan(
 ) -> Image.Image:
     """A plan from above, with its clutter, a dot with its heading for each start, a ring for each goal, and paths,
     lines of points [m] such as ``walk.trace.path``; ``title`` is name and free area by default, "" leaves it away."""
-    figure = draw_floorplan(open_plan(plan), None, blocks, routes, paths, title)
-    file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=_DPI)
-    return Image.open(file).convert("RGB")
+    drawn = {"blocks": blocks, "start_goals": routes, "paths": paths, "title": title}
+    return Image.open(io.BytesIO(encode_floorplan(open_plan(plan), **drawn))).convert("RGB")

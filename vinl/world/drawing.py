@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -85,6 +86,13 @@ def draw_floorplan(
     figure = axes.get_figure(root=True)
     assert figure is not None
     return figure
+
+
+def encode_floorplan(plan: FloorPlan, dpi: int = 90, **drawn) -> bytes:
+    """Draw a plan (arguments as in ``draw_floorplan``): the content of a PNG file."""
+    file = io.BytesIO()
+    draw_floorplan(plan, **drawn).savefig(file, format="png", dpi=dpi)
+    return file.getvalue()
 
 
 def save_floorplan(plan: FloorPlan, out: str | Path, dpi: int = 100, **drawn) -> Path:

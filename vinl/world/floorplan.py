@@ -82,6 +82,12 @@ class FloorPlan:
             f"{len(self.furniture)} of furniture, {len(self.labels)} rooms)"
         )
 
+    def _repr_png_(self) -> bytes:
+        """A picture from above, for notebooks."""
+        from vinl.world.drawing import encode_floorplan  # it draws plans, so it has to know this class first
+
+        return encode_floorplan(self)
+
     @property
     def area_m2(self) -> float:
         """Free floor [m2]."""
