@@ -237,7 +237,7 @@ def test_picture_shows_the_robot() -> None:
         ({"joint_reach": 0.0}, "joint_reach"),
         ({"control": "joints", "locomotor": "rough"}, "the agent is the locomotor"),
         ({"navigator": "oracle"}, "the agent is the navigator"),
-        ({"floorplans": [PLAN, PLAN]}, "two floor plans"),
+        ({"floorplans": [PLAN, vinl.load_floorplan(PLAN)]}, "two floor plans"),
     ],
 )
 def test_options_that_make_no_sense(options: dict, words: str) -> None:

