@@ -5,6 +5,7 @@ import io
 import json
 import re
 import resource
+import shutil
 import subprocess
 import sys
 import threading
@@ -17,9 +18,10 @@ import pytest
 from rich.console import Console
 
 from vinl.cli.app import COMMANDS, main
-from vinl.cli.options import default_out
+from vinl.cli.options import check_config, default_out
 from vinl.cli.training import TrainingOptions
 from vinl.config.errors import InputError
+from vinl.config.paths import configs_dir
 from vinl.courses.evaluate import TrialResults
 from vinl.courses.report import _COLUMNS, print_comparison
 from vinl.nav.training import describe_figures
@@ -77,7 +79,16 @@ MISTAKES = {
     "eval harbour_flat": "'harbour_flat' is no setting (key=value), and a name stands behind its option",
     "eval-loco --terrain bar": "did you mean 'bars'?; known: flat, rough, blocks, litter, rooms, bars",
     "eval --floorplans harbor_flat": "did you mean 'harbour_flat'",
+    "eval --floorplans=": "the name of a floor plan is empty; give a file or a shipped plan",
     "eval --out=": "--out is empty",
+    "export loco --out=": "--out is empty; give the name of a file",
+    "export --scene harbour_flat --out=": "--out is empty; give the name of a folder",
+    "plans generate --count 1 --out=": "--out is empty; give the name of a folder",
+    "plans show harbour_flat --out=": "--out is empty; give the name of a file",
+    "report . --out=": "--out is empty",
+    "train-loco --device cpu --num-envs 8 --iterations 1 --out=": "--out is empty",
+    "train-nav --device cpu --num-envs 8 --iterations 1 --out=": "--out is empty",
+    "train-nav --resume runs/mine --seed 0": "--resume goes on with the run's own config",
     "eval --out /proc/foo": "nothing can be written there",
     "bench memory --config loco/rough": "--config loco/rough is a config of locomotion, not of navigation",
     "train-loco --config nav/default": "use vinl train-nav --config nav/default",
@@ -96,6 +107,26 @@ def test_mistakes_are_one_line(words: str, capsys: pytest.CaptureFixture[str]) -
     assert main(words.split(" ")) == 2
     said = capsys.readouterr().err
     assert MISTAKES[words] in said and said.count("\n") == 1
+
+
+def test_config_files_of_another_kind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Their keys tell, whatever they are called: a file may also be the config.yaml of a run."""
+    loco, nav, noise = tmp_path / "loco.yaml", tmp_path / "config.yaml", tmp_path / "noise.yaml"
+    shutil.copy(configs_dir() / "loco" / "rough.yaml", loco)
+    nav.write_text("extends: nav/default\nseed: 2\n")
+    noise.write_text("noise: 0.0\n")
+    for words, said in (
+        (f"train-nav --config {loco}", f"{loco} is a config of locomotion, not of navigation: use vinl train-loco"),
+        (f"train-loco --config {nav}", f"{nav} is a config of navigation, not of locomotion: use vinl train-nav"),
+        (f"eval --config {loco}", "is a config of locomotion, not of evaluation"),
+        (f"eval --config {noise}", "is a config of depth cameras, not of evaluation"),
+        (f"eval --config {tmp_path / 'none.yaml'}", "does not exist"),
+    ):
+        assert main(words.split()) == 2
+        assert said in capsys.readouterr().err
+    for text in ("time_limt: 3", "seed: 2", ""):  # a slip, a key that many have, none: its own errors are better
+        nav.write_text(text)
+        check_config(str(nav), "navigation")
 
 
 def test_runs_of_the_other_kind_and_runs_that_are_done(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -50,8 +50,9 @@ def test_generate_writes_homes_that_are_read_again(tmp_path, capsys):
     assert '"furniture": []' in (out / "home-7.json").read_text()
 
 
-def test_a_layout_has_sizes_of_its_own(tmp_path):
+def test_a_layout_has_sizes_of_its_own(tmp_path, capsys):
     assert main(["generate", "--layout", "office", "--count", "1", "--out", str(tmp_path), "--no-picture"]) == 0
+    assert capsys.readouterr().out.startswith("1 home in ")
     assert load_floorplan(str(tmp_path / "home-0.json")).inside.sum() * 0.05**2 > 0.8 * 150.0
 
 

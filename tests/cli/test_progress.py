@@ -43,8 +43,9 @@ def test_what_is_said_after_ctrl_c() -> None:
         progress.show("walk", 3, 10)
         raise KeyboardInterrupt
     assert "stopped after 3 of 10 episodes; runs/a keeps them" in console.file.getvalue()  # type: ignore[attr-defined]
-    with pytest.raises(KeyboardInterrupt), Progress(console, "runs/b keeps them") as progress:
-        progress.show("plan", 0, 1)
-        progress.show("walk", 0, 10)
-        raise KeyboardInterrupt
-    assert "stopped after 0 of 10 episodes; nothing was written" in console.file.getvalue()  # type: ignore[attr-defined]
+    for more, said in (({}, "nothing was written"), ({"empty": "none in runs/b"}, "none in runs/b")):
+        with pytest.raises(KeyboardInterrupt), Progress(console, "runs/b keeps them", **more) as progress:
+            progress.show("plan", 0, 1)
+            progress.show("walk", 0, 10)
+            raise KeyboardInterrupt
+        assert f"stopped after 0 of 10 episodes; {said}" in console.file.getvalue()  # type: ignore[attr-defined]

@@ -29,8 +29,11 @@ def test_config_says_who_is_trained_and_where_to(monkeypatch: pytest.MonkeyPatch
     assert runs[0].complete and runs[0].metrics == [{"iteration": 1}]
 
 
-def test_neither_legs_nor_navigator() -> None:
+def test_refusals() -> None:
     for config, words in (("rough", "neither"), ("loco/rouhg", "did you mean"), ("nav/nothing", "nothing")):
         with pytest.raises(InputError, match=words):
             vinl.train(config)
+    for out, words in (("", "--out is empty"), ("/proc/foo", "nothing can be written there")):
+        with pytest.raises(InputError, match=words):
+            vinl.train("nav/default", ["num_envs=8", "iterations=1"], out=out)
     assert not Path("runs").exists()

@@ -34,6 +34,8 @@ def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
         ("--replay nowhere", "vinl eval --record"),
         ("--replay . --loco rough", "--replay shows what was recorded"),
         ("--replay . --sensors realistic", "takes no --sensors"),
+        ("--replay . --config eval/default", "takes no --sensors, --drift, --config"),
+        ("--replay . --seed 3", "--replay shows what was recorded"),
         ("--sensors realistc", "did you mean 'realistic'"),
         ("faults.action_delay=0.5s", "faults.action_delay=0.5s"),
         ("--config loco/rough", "is a config of locomotion"),

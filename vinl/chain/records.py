@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from vinl.config.output import round_numbers
+from vinl.config.words import count_things
 from vinl.world.floorplan import FloorPlan
 
 Key = tuple[str, int, int]
@@ -163,7 +164,7 @@ class Results:
         who = " + ".join(str(policy["name"]) for policy in self.policies.values())
         n, plans = len(self.episodes), len(self.plans)
         success = 100 * self.aggregate["success"]["mean"]
-        walked = f"{n} episode{'s' * (n != 1)} in {plans} floor plan{'s' * (plans != 1)}"
+        walked = f"{count_things(n, 'episode')} in {count_things(plans, 'floor plan')}"
         return f"Results({who}: {walked}, success {success:.1f} %)"
 
     def _repr_html_(self) -> str:

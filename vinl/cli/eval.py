@@ -237,7 +237,9 @@ def _walk(
     from vinl.benchmark.evaluate import evaluate_rows
     from vinl.cli.progress import Progress
 
-    with Progress(console, f"{out} keeps them; the same command goes on from there") as progress:
+    kept = f"{out} keeps them; the same command goes on from there"
+    # the folder may be there already, and hold the plans or episodes of before
+    with Progress(console, kept, f"no episode was added to {out}; the same command goes on") as progress:
         return evaluate_rows(
             rows, protocol, options.workers, folders, True, options.fresh, command, progress.show, options.cluster
         )

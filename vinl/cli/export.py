@@ -32,6 +32,8 @@ class Options:
     """With --scene: clutter: none, paper or dense."""
     seed: int = 0
     """With --scene: of clutter, heading and joint angles at the start."""
+    resolution: float | None = None
+    """With --scene: metres per pixel of a floor plan that is a bare picture; 0.05 if not given."""
 
 
 def main(argv: list[str]) -> int:
@@ -49,7 +51,7 @@ def _export_policy(options: Options, name: str) -> int:
     from vinl.export.parity import LIMIT
     from vinl.export.policy import ParityError, export_policy
 
-    console, out = Console(), options.out or f"{Path(name).resolve().name}.onnx"
+    console, out = Console(), f"{Path(name).resolve().name}.onnx" if options.out is None else options.out
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("walking", total=options.steps)
         try:
@@ -72,10 +74,13 @@ def _export_policy(options: Options, name: str) -> int:
 
 
 def _export_home(options: Options, name: str) -> int:
+    from vinl.config.words import count_things
     from vinl.export.home import export_home
     from vinl.world.readers import load_floorplan
 
-    plan = load_floorplan(name)
-    folder = export_home(plan, options.out or plan.name, options.episodes, options.obstacles, options.seed)
-    print(f"{folder}: {plan.name} as home.xml, {options.episodes} episodes with clutter {options.obstacles}")
+    plan = load_floorplan(name, options.resolution)
+    out = plan.name if options.out is None else options.out
+    folder = export_home(plan, out, options.episodes, options.obstacles, options.seed)
+    episodes = count_things(options.episodes, "episode")
+    print(f"{folder}: {plan.name} as home.xml, {episodes} with clutter {options.obstacles}")
     return 0

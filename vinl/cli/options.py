@@ -6,6 +6,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import dataclasses
+import importlib
 import inspect
 import io
 import re
@@ -19,6 +20,7 @@ import tyro
 
 from vinl.config.errors import InputError
 from vinl.config.loader import closest
+from vinl.config.words import count_things
 
 if TYPE_CHECKING:
     from vinl.chain.config import EvaluationConfig
@@ -174,18 +176,48 @@ COMMANDS = {"locomotion": "vinl train-loco", "navigation": "vinl train-nav"}
 """Kind of policy to the command that trains it."""
 
 _FOLDERS = {"loco": "locomotion", "nav": "navigation", "eval": "evaluation", "sensors": "depth cameras"}
+"""Folder of shipped configs to what they are of."""
+
+_CONFIGS = {
+    "locomotion": ("vinl.loco.config", "LocoConfig"),
+    "navigation": ("vinl.nav.config", "NavConfig"),
+    "evaluation": ("vinl.chain.config", "EvaluationConfig"),
+    "depth cameras": ("vinl.sensing.sensor_config", "SensorConfig"),
+}
+"""What a config is of to module and name of its dataclass."""
 
 
 def check_config(name: str, kind: str) -> None:
-    """Refuse a shipped config of another kind.
+    """Refuse a config of another kind: of shipped ones the folder tells, of files the keys.
 
     Raises:
-        InputError: it is one.
+        InputError: it is one, or the file cannot be read.
     """
-    found = _FOLDERS.get(name.removeprefix("configs/").split("/")[0], kind) if "/" in name else kind
+    if name.endswith((".yaml", ".yml")):
+        found = _recognise(name, kind)
+    else:
+        found = _FOLDERS.get(name.removeprefix("configs/").split("/")[0], kind) if "/" in name else kind
     if found != kind:
         instead = f": use {COMMANDS[found]} --config {name}" if found in COMMANDS else ""
         raise InputError(f"--config {name} is a config of {found}, not of {kind}{instead}")
+
+
+def _recognise(file: str, kind: str) -> str:
+    """What a config file is of: ``kind``, unless it has keys that are not of it and another kind knows more of them."""
+    from vinl.config.loader import read_config
+
+    keys = set(read_config(file))
+
+    def count_known(kind: str) -> int:
+        module, name = _CONFIGS[kind]
+        return len(keys & {field.name for field in dataclasses.fields(getattr(importlib.import_module(module), name))})
+
+    known = count_known(kind)
+    if known == len(keys):  # the other kinds need not be imported
+        return kind
+    others = {other: count_known(other) for other in _CONFIGS if other != kind}
+    likely = max(others, key=lambda other: others[other])
+    return likely if others[likely] > known else kind
 
 
 def load_rules(config: str, overrides: Sequence[str], sensors: str | None, drift: float | None) -> EvaluationConfig:
@@ -243,8 +275,6 @@ def check_run(folder: str, kind: str, iterations: int | None) -> None:
     if found != kind:
         raise InputError(f"{folder} is a {found} run: use {COMMANDS[found]} --resume {folder}")
     row = run.read_last_metrics()
-    done = 0 if row is None else row["iteration"]
+    done = 0 if row is None else int(row["iteration"])
     if iterations is not None and done >= iterations:
-        raise InputError(
-            f"{folder} already has {done} iteration{'s' if done != 1 else ''}; give more with --iterations"
-        )
+        raise InputError(f"{folder} already has {count_things(done, 'iteration')}; give more with --iterations")

@@ -22,7 +22,7 @@ class ShowPlan:
     path: Positional[str]
     """PNG, PGM, ROS map YAML, JSON of ProcTHOR, HouseExpo or vectors (file.jsonl.gz:17 for one of many), mesh (GLB,
     OBJ, PLY, STL) or the name of a shipped plan."""
-    out: Path | None = None
+    out: str | None = None
     """PNG file for the picture; not drawn if left away."""
     resolution: float | None = None
     """Metres per pixel of a bare picture (0.05 if left away), metres per unit of a mesh (1 if left away)."""
@@ -44,7 +44,7 @@ class GeneratePlans:
 
     overrides: Settings = ()
     """Settings of the config, for example area=[60,90] furniture_density=[0,0]."""
-    out: Path = Path("runs/homes")
+    out: str = "runs/homes"
     """Folder for home-SEED.json, and contact.png with all homes in it."""
     count: int = 20
     """How many homes."""
@@ -96,6 +96,8 @@ def _list_plans() -> None:
 
 def _generate_plans(options: GeneratePlans) -> None:
     from vinl.config.loader import build_config, dump_config, load_config
+    from vinl.config.output import check_out
+    from vinl.config.words import count_things
     from vinl.world.drawing import save_contact_sheet
     from vinl.world.homes import HomeConfig, generate_home
     from vinl.world.homes.config import layout_config
@@ -113,23 +115,27 @@ def _generate_plans(options: GeneratePlans) -> None:
         config = load_config(HomeConfig, options.config, options.overrides)
     if options.config is None and config.layout != options.layout:
         raise InputError(f"layout={config.layout}: give --layout {config.layout}, which has sizes of its own")
+    out = check_out(options.out)
     plans = [generate_home(options.seed + k, config) for k in range(options.count)]
     for plan in plans:
-        write_floorplan(plan, options.out / f"{plan.name}.json")
+        write_floorplan(plan, out / f"{plan.name}.json")
     areas = [plan.area_m2 for plan in plans]
-    print(f"{len(plans)} homes in {options.out}, {min(areas):.0f} to {max(areas):.0f} m2 of free floor")
+    print(f"{count_things(len(plans), 'home')} in {out}, {min(areas):.0f} to {max(areas):.0f} m2 of free floor")
     if not options.no_picture:
-        print(f"  picture   {save_contact_sheet(plans[:100], options.out / 'contact.png')}")
+        print(f"  picture   {save_contact_sheet(plans[:100], out / 'contact.png')}")
 
 
 def _show_plan(options: ShowPlan) -> None:
     import numpy as np
 
+    from vinl.config.output import check_named
     from vinl.world.clutter import choose_clutter, scatter_blocks
     from vinl.world.free_space import FreeSpace, comfortable_path
     from vinl.world.readers import load_floorplan
     from vinl.world.start_goal import sample_start_goals
 
+    if options.out is not None:
+        check_named(options.out, "file")
     clutter = choose_clutter(options.obstacles)
     if options.seed < 0:
         raise InputError(f"--seed {options.seed}: give a number, 0 or more")

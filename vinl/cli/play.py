@@ -39,8 +39,8 @@ class Options:
     """Errors of the depth cameras, as in vinl eval: ideal (none, the default), realistic, or a YAML file."""
     drift: float | None = None
     """Of the odometry by which a learned navigator knows where it is, as in vinl eval (0.02: 2 %; default: 0)."""
-    config: str = "eval/default"
-    """Rules of the evaluation: a shipped config or a YAML file."""
+    config: str | None = None
+    """Rules of the evaluation: a shipped config or a YAML file (default: eval/default)."""
     replay: str | None = None
     """Folder of vinl eval --record: show its episodes instead of a live robot."""
     episode: int = 0
@@ -75,14 +75,22 @@ def main(argv: list[str]) -> int:
     return 0
 
 
+_RULES = ("sensors", "drift", "config", "obstacles", "density", "seed")
+"""Options of a live robot's surroundings and rules, which a recording brings along."""
+
+
+def _is_given(options: Options, name: str) -> bool:
+    return getattr(options, name) != getattr(Options, name)
+
+
 def _check(options: Options) -> None:
     given = [name for name in ("plan", "terrain", "replay") if getattr(options, name) is not None]
     if len(given) > 1:
         raise InputError(f"--{given[0]} and --{given[1]} do not go together; give one of them")
     if options.replay is not None and (options.loco is not None or options.nav is not None):
         raise InputError("--replay shows what was recorded; it takes no --loco, --policy or --nav")
-    if options.replay is not None and (options.overrides or options.sensors is not None or options.drift is not None):
-        raise InputError("--replay shows what was recorded; it takes no --sensors, --drift or settings")
+    if options.replay is not None and (options.overrides or any(_is_given(options, name) for name in _RULES)):
+        raise InputError(f"--replay shows what was recorded; it takes no --{', --'.join(_RULES)} or settings")
     if not 0 <= options.port <= 65535:
         raise InputError(f"--port must lie between 0 and 65535, got {options.port}")
     if options.seed < 0:
@@ -95,6 +103,7 @@ def _open(options: Options) -> Viewer:
     server = {"host": options.host, "port": options.port}
     if options.replay is not None:
         return replay(options.replay, options.episode, pace=options.pace, **server)
+    rules = "eval/default" if options.config is None else options.config
     return play(
         options.plan,
         options.loco,
@@ -104,6 +113,6 @@ def _open(options: Options) -> Viewer:
         terrain=options.terrain,
         density=options.density,
         pace=options.pace,
-        config=load_rules(options.config, options.overrides, options.sensors, options.drift),
+        config=load_rules(rules, options.overrides, options.sensors, options.drift),
         **server,
     )

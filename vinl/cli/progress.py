@@ -12,6 +12,7 @@ from rich.text import Text
 
 _TITLES = {"plan": "floor plans", "walk": "episodes", "film": "films", "robot": "robots", "crossing": "crossings"}
 
+_LOST = "nothing was written"
 
 _BAR = 24
 """Width of the bar: at 80 columns there is room for what stands beside it."""
@@ -40,10 +41,11 @@ class Progress:
     Args:
         console: where to.
         kept: what becomes of the work done when the run is interrupted.
+        empty: the same where no piece of it was done.
     """
 
-    def __init__(self, console: Console, kept: str = "nothing was written") -> None:
-        self._console, self._kept = console, kept
+    def __init__(self, console: Console, kept: str = _LOST, empty: str = _LOST) -> None:
+        self._console, self._kept, self._empty = console, kept, empty
         self._bar = Bar(
             TextColumn("{task.description:<12}"),
             BarColumn(_BAR),
@@ -77,5 +79,5 @@ class Progress:
         self._bar.stop()
         if kind is KeyboardInterrupt:
             done = ", ".join(f"{d} of {t} {_TITLES.get(w, w)}" for w, (d, t) in self._counts.items() if w != "plan")
-            kept = self._kept if any(d for w, (d, _) in self._counts.items() if w != "plan") else "nothing was written"
+            kept = self._kept if any(d for w, (d, _) in self._counts.items() if w != "plan") else self._empty
             self._console.print(f"stopped after {done or 'nothing'}; {kept}", soft_wrap=True)

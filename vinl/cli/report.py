@@ -33,7 +33,8 @@ def main(argv: list[str]) -> int:
     from vinl.benchmark.report import print_summary, print_table
     from vinl.config.output import check_out
 
-    out = check_out(options.out or (options.folders[0] if len(options.folders) == 1 else "runs/report"))
+    default = options.folders[0] if len(options.folders) == 1 else "runs/report"
+    out = check_out(default if options.out is None else options.out)
     console = Console()
     table, is_table = read_folders([Path(folder) for folder in options.folders], out, options.reference)
     if is_table:

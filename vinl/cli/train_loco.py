@@ -39,7 +39,7 @@ class Options(TrainingOptions):
         """Refuse stages that do not exist too, and one beside --resume."""
         if self.stage not in (None, *STAGES):
             raise InputError(f"--stage {self.stage} does not exist; choose {', '.join(map(str, STAGES))}")
-        if self.resume and self.stage is not None:
+        if self.resume is not None and self.stage is not None:
             raise InputError("--resume goes on with the run's own stage; leave --stage out")
         super().check()
 

@@ -74,9 +74,10 @@ class TrainingOptions:
         if self.save_every <= 0:
             raise InputError(f"--save-every must be positive, got {self.save_every}")
         check_fields(self, "--", counts=("iterations", "devices"), positive=("minutes",))
-        if self.resume and self.from_policy:
+        if self.resume is not None and self.from_policy is not None:
             raise InputError("--from starts a new run and --resume goes on with an old one; give one of them")
-        if self.resume and (self.overrides or self.config or self.out or self.num_envs or self.seed):
+        new = (self.config, self.out, self.num_envs, self.seed)
+        if self.resume is not None and (self.overrides or any(given is not None for given in new)):
             raise InputError(
                 "--resume goes on with the run's own config; only --iterations, --minutes, --device and "
                 "--devices may be given"
@@ -115,7 +116,7 @@ class TrainingOptions:
         from vinl.config.output import check_out
         from vinl.rl.run_folder import RunFolder
 
-        if self.resume:
+        if self.resume is not None:
             check_run(self.resume, policy, self.iterations)
             folder, config, robots = self.resume, None, int(RunFolder(self.resume).open().get("num_envs", 0))
         else:
@@ -126,7 +127,7 @@ class TrainingOptions:
             given = [f"{name}={value}" for name, value in short.items() if value is not None]
             config = load_config(kind, source, [*self.overrides, *given])
             name = source.removesuffix(".yaml").split("/")[-1]
-            folder, robots = self.out or f"runs/{prefix}{name}", config.num_envs
+            folder, robots = f"runs/{prefix}{name}" if self.out is None else self.out, config.num_envs
         check_out(folder)
         return folder, config, robots
 

@@ -35,15 +35,24 @@ def strip_command(argv: Sequence[str]) -> list[str]:
     return kept
 
 
+def check_named(out: str | Path, what: str = "folder") -> Path:
+    """The folder, or whatever is written, if it has a name: without one, ``Path`` would take it for the current folder.
+
+    Raises:
+        InputError: it has none.
+    """
+    if not str(out).strip():
+        raise InputError(f"--out is empty; give the name of a {what}")
+    return Path(out)
+
+
 def check_out(out: str | Path) -> Path:
     """The folder to write to, which need not exist yet.
 
     Raises:
         InputError: it has no name, it or a folder above it is a file, or nothing can be written there.
     """
-    if not str(out).strip():
-        raise InputError("--out is empty; give the name of a folder")
-    out = Path(out)
+    out = check_named(out)
     try:
         for path in (out, *out.parents):
             if path.is_dir():

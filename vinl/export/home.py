@@ -12,6 +12,7 @@ from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import EpisodeSetup, draw_routes, draw_setups
 from vinl.chain.scene import scene_spec
 from vinl.config.errors import InputError
+from vinl.config.output import check_out
 from vinl.world.boxes import Boxes
 from vinl.world.clutter import choose_clutter
 from vinl.world.floorplan import FloorPlan
@@ -24,14 +25,14 @@ def export_home(plan: FloorPlan, out: str | Path, episodes: int = 10, obstacles:
     walls and furniture, and a body ``blocks`` without geoms; ``episodes.json`` the time limit [s] and for each episode
     start, goal [m], yaw, joint angles [rad], the shortest path [m] and blocks as rows of ``Blocks``. Raises
     ``InputError`` if the clutter is unknown, there is no such number of episodes, or the folder cannot be written."""
-    clutter = choose_clutter(obstacles, "obstacles")
+    folder, clutter = check_out(out), choose_clutter(obstacles, "obstacles")
     if episodes < 1:
         raise InputError(f"episodes must be at least 1, got {episodes}")
     if seed < 0:
         raise InputError(f"seed must not be negative, got {seed}")
     rules = EvaluationConfig()
     setups = draw_setups(plan, draw_routes(plan, episodes, rules), seed, clutter, rules)
-    folder, spec = Path(out), scene_spec(plan.boxes, Boxes.empty())
+    spec = scene_spec(plan.boxes, Boxes.empty())
     spec.modelname, spec.comment = plan.name, ""
     tasks = {
         "plan": plan.name,

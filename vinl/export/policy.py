@@ -17,7 +17,7 @@ import torch
 
 from vinl.chain.workers import one_thread
 from vinl.config.errors import InputError
-from vinl.config.output import write_whole
+from vinl.config.output import check_named, write_whole
 from vinl.export.metadata import describe_step
 from vinl.export.parity import LIMIT, ExportedPolicy, Parity, compare_steps, record_steps
 from vinl.export.step import Step
@@ -84,8 +84,8 @@ def export_policy(
 
 
 def check_file(out: str | Path) -> Path:
-    """A path that may be that of an ONNX file. Raises ``InputError`` if it ends otherwise, or is a folder."""
-    path = Path(out)
+    """A path that may be that of an ONNX file. Raises ``InputError`` if it is empty, ends otherwise, or is a folder."""
+    path = check_named(out, "file")
     if path.suffix != ".onnx":
         raise InputError(f"--out {path} must end with .onnx")
     if path.is_dir():

@@ -12,6 +12,7 @@ from typing import Any
 
 from vinl.config.errors import InputError
 from vinl.config.loader import load_config
+from vinl.config.output import check_out
 from vinl.policies.device import choose_training_device
 from vinl.policies.io import load_policy
 from vinl.policies.policy import Policy
@@ -65,7 +66,7 @@ def train(
         InputError: a name, a setting or the folder cannot be used.
     """
     device = choose_training_device(device)
-    kind, folder = config.split("/")[0], _find_place(config) if out is None else Path(out)
+    kind, folder = config.split("/")[0], check_out(_find_place(config) if out is None else out)
     if kind == "nav":
         from vinl.nav.config import NavConfig
         from vinl.nav.training import train_navigator

@@ -81,7 +81,7 @@ def read_pixels(file: Path) -> tuple[UInt8[np.ndarray, "rows columns"], UInt8[np
     except (Image.DecompressionBombWarning, Image.DecompressionBombError):
         raise InputError(
             f"{file}: the picture is too large: up to {MAX_PIXELS / 1e6:.0f} million pixels are read, such as 7,000 x "
-            "7,000; scale it down and give its new scale with --resolution"
+            "7,000; scale it down and give its new scale, with --resolution or in the YAML of a ROS map"
         ) from None
     except (OSError, SyntaxError, ValueError) as error:
         raise InputError(f"{file}: the picture is damaged ({error}); save it again as PNG or PGM") from None
