@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from vinl.courses import report
+from vinl.courses import crossing_pictures
 from vinl.courses.crossing import (
     APPROACH,
     SPREAD,
@@ -163,13 +163,15 @@ def test_figures_of_known_records() -> None:
 
 @pytest.mark.parametrize("name", ["bar.mp4", "bar.gif"])
 def test_pictures_are_written(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(report, "SIZE", (64, 32))
+    monkeypatch.setattr(crossing_pictures, "SIZE", (64, 32))
     qpos = np.stack([home_qpos(x) for x in np.linspace(-1.2, 1.2, 13)])
     touching = np.zeros((13, 4), bool)
     touching[6] = True
     traces = {name: CrossingTrace(qpos, touching, touching, touching[:, 0]) for name in "ab"}
-    report.draw_feet({name: [trace, trace] for name, trace in traces.items()}, 0.1, 0.2, Path("out/feet.png"))
-    report.film_crossings(traces, 0.1, 0.2, Path("out") / name)
+    crossing_pictures.draw_feet(
+        {name: [trace, trace] for name, trace in traces.items()}, 0.1, 0.2, Path("out/feet.png")
+    )
+    crossing_pictures.film_crossings(traces, 0.1, 0.2, Path("out") / name)
     assert sorted(p.name for p in Path("out").iterdir()) == sorted([name, "feet.png"])
     with imageio.get_reader(Path("out") / name) as film:
         assert film.get_data(0).shape[:2] == (64, 64)
