@@ -170,6 +170,7 @@ def test_bad_words() -> None:
 
 
 WRONG = {
+    "vinl.evaluate(3)": "a floor plan is a name, a file or a FloorPlan, got int",
     "vinl.evaluate([3])": "a floor plan is a name, a file or a FloorPlan, got int",
     "vinl.evaluate('harbour_flat', episodes='x')": "--episodes must be a number, got 'x'",
     "vinl.evaluate('harbour_flat', films='first', out='/proc/films')": "nothing can be written there",

@@ -120,7 +120,8 @@ def _generate_plans(options: GeneratePlans) -> None:
     for plan in plans:
         write_floorplan(plan, out / f"{plan.name}.json")
     areas = [plan.area_m2 for plan in plans]
-    print(f"{count_things(len(plans), 'home')} in {out}, {min(areas):.0f} to {max(areas):.0f} m2 of free floor")
+    size = " to ".join(dict.fromkeys(f"{area:.0f}" for area in (min(areas), max(areas))))
+    print(f"{count_things(len(plans), 'home')} in {out}, {size} m2 of free floor")
     if not options.no_picture:
         print(f"  picture   {save_contact_sheet(plans[:100], out / 'contact.png')}")
 

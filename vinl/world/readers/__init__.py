@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -107,7 +107,9 @@ def load_floorplans(
 def open_floorplans(floorplans: str | Path | FloorPlan | Sequence[str | Path | FloorPlan]) -> list[FloorPlan]:
     """Floor plans from names, files and plans, or from one of them; all shipped ones from an empty list. What is given
     twice is there once. Raises ``InputError`` if a file is missing or broken, or it is no floor plan at all."""
-    chosen = [floorplans] if isinstance(floorplans, (str, Path, FloorPlan)) else list(floorplans)
+    if isinstance(floorplans, (str, Path, FloorPlan)) or not isinstance(floorplans, Iterable):
+        floorplans = [floorplans]
+    chosen = list(floorplans)
     for plan in chosen:
         if not isinstance(plan, (str, Path, FloorPlan)):
             raise InputError(f"a floor plan is a name, a file or a FloorPlan, got {type(plan).__name__}")
