@@ -161,7 +161,7 @@ def print_table(console: Console, data: Mapping[str, Any], out: Path) -> None:
             format_number(a["falls"], 1, 100),
             str(a["episodes"]),
         )
-    console.print(table)
+    print_fitting(console, table, ("n", "SPL", "f/m"))
     console.print(
         "in brackets: the paper; f/m: foot collisions per metre by its rule; foot/m: by ours, every physics step"
     )
@@ -179,7 +179,7 @@ def print_faults(console: Console, data: Mapping[str, Any]) -> None:
         cells += [format_number(a[key]["mean"]) for key, _ in _FAULTS]
         more = "" if difference is None else format_number(difference["foot_collisions_per_m"]["difference"], sign="+")
         table.add_row(name, *cells, more, str(a["episodes"]))
-    console.print(table)
+    print_fitting(console, table, ("n", "more foot/m"))
 
 
 def format_figure(figure: Mapping[str, Any], digits: int = 2, factor: float = 1.0) -> str:
