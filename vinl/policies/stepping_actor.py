@@ -121,7 +121,8 @@ class SteppingActor(PolicyNetwork):
         self.dates_images = eye is not None and self.remembers
         self.velocity = nn.Linear(hidden, 3)
         self.actor = step_layers(actor, actions)
-        nn.init.normal_(self.velocity.weight, std=0.01)  # it begins with the belief that it stands
+        if not self.velocity.weight.is_meta:  # a policy that is loaded: there torch would import its compiler, 1.8 s
+            nn.init.normal_(self.velocity.weight, std=0.01)  # it begins with the belief that it stands
         nn.init.zeros_(self.velocity.bias)
         # no weights, but on the network's device; they have their numbers even where networks are built without any
         for name, numbers in (
