@@ -137,7 +137,7 @@ def test_robot_walks_to_a_clicked_goal_and_is_driven_by_keys(browser: Browser):
         until(page, 'text("state") === "standing" && value("distance") < 0.3')
 
 
-def test_block_is_dropped_by_a_click_and_clutter_drawn_by_a_button(browser: Browser):
+def test_block_is_dropped_by_a_click_clutter_drawn_by_a_button_and_the_robot_driven_by_a_slider(browser: Browser):
     with (
         served("--plan", "harbour_flat", "--loco", "rough", "--nav", "oracle", "--obstacles", "paper") as url,
         opened(browser, url, 1000, 600) as page,  # where the click meets a free floor
@@ -154,6 +154,11 @@ def test_block_is_dropped_by_a_click_and_clutter_drawn_by_a_button(browser: Brow
         until(page, 'value("blocks") === 1')
         page.get_by_text("Draw anew", exact=True).click()
         until(page, 'value("blocks") > 10')
+
+        drive = page.locator("input[inputmode=decimal]").nth(2)  # after pace and push: the number beside Forward
+        drive.fill("0.4")
+        drive.press("Enter")
+        until(page, 'text("state") === "driven" && value("command") > 0.35')
 
 
 def test_recording_is_scrubbed_by_its_slider(browser: Browser, folder: Path):
