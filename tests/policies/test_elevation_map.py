@@ -11,7 +11,7 @@ import torch
 from vinl.chain.depth_cameras import DepthCameras
 from vinl.gait.local_map import POINTS, WALL
 from vinl.gait.proprioception import feet_in_trunk, heading_axes, into_heading_frame, motion_of
-from vinl.policies.elevation_map import NEAR, SIDE, UNSEEN, ElevationMap, MapState
+from vinl.policies.elevation_map import CELL, NEAR, SIDE, UNSEEN, ElevationMap, MapState
 from vinl.robot.aliengo import CONTROL_DT, FOOT_RADIUS, home_qpos
 from vinl.robot.cameras import LOCOMOTION_CAMERA
 from vinl.robot.rotation import rotate_inverse
@@ -143,6 +143,17 @@ def test_ground_left_behind_is_forgotten_and_a_fresh_robot_knows_nothing() -> No
     assert shown > 100 and (still.heights == UNSEEN).all() and still.heights.shape == (1, SIDE**2)
     fresh = elevation.forget(state, torch.tensor([True]))
     assert (fresh.heights == UNSEEN).all() and not elevation.read(fresh).any() and not fresh.pose.any()
+
+
+@pytest.mark.parametrize("ulp", [-2, 0, 2])
+def test_a_point_is_in_a_cell_of_the_map_however_a_device_rounds(ulp: int, monkeypatch) -> None:
+    monkeypatch.setattr("vinl.policies.elevation_map._PER_SIDE", (1 / SIDE) * (1 + ulp * 2.0**-24))
+    cells = np.arange(-20_000, 20_000)  # 500 m to all sides
+    at = torch.from_numpy((cells + 0.5) * CELL).float()[None]
+    for x, y in ((at, torch.zeros_like(at)), (torch.zeros_like(at), at)):
+        index = ElevationMap._index(torch.zeros(1, 3), x, y)[0].numpy()
+        column, row = (torch.floor(part[0] / CELL).int().numpy() % SIDE for part in (x, y))
+        np.testing.assert_array_equal(index, column * SIDE + row)
 
 
 def test_motion_of_the_trunk_is_what_it_reckons_with() -> None:

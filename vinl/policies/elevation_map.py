@@ -26,6 +26,8 @@ SIDE = 112
 """Cells along each side: 2.8 m, what the planner reads at any heading. Cells that the robot leaves behind are used
 again for those ahead."""
 
+_PER_SIDE = 1 / SIDE
+
 UNSEEN = -10.0
 """Height of a cell that no image showed [m]."""
 
@@ -198,8 +200,9 @@ class ElevationMap(nn.Module):
             cls._cell_of(at[:, None] + turned)
             for at, turned in zip(pose[:, :2].unbind(1), _turned(pose[:, 2:], x, y), strict=True)
         )
-        column, row = (cell - SIDE * torch.floor(cell / SIDE) for cell in (column, row))  # whole numbers below 2^24
-        return (column * SIDE + row).long()
+        # from a cell's middle: where a device rounds 112 / 112 to less than 1, a whole number would be cell 112 of 112
+        column, row = (cell - SIDE * torch.floor((cell + 0.5) * _PER_SIDE) for cell in (column, row))
+        return (column * SIDE + row).long()  # whole numbers below 2^24
 
 
 def _turned(angle: Float[Tensor, "n 1"], x: Float[Tensor, "*n k"], y: Float[Tensor, "*n k"]) -> tuple[Tensor, Tensor]:
