@@ -14,7 +14,7 @@ from vinl.chain.episode import draw_routes
 from vinl.chain.metrics import spl
 from vinl.cli.app import main
 from vinl.config.errors import InputError
-from vinl.config.loader import build_config
+from vinl.config.loader import build_config, load_config
 from vinl.config.paths import assets_dir
 from vinl.nav.config import NavConfig
 from vinl.nav.evaluation import (
@@ -115,6 +115,14 @@ def test_it_drives_at_the_speeds_of_the_policys_card(untrained):
     restless = replace(card, action={"forward_speed": [0.1, 0.6]})
     with pytest.raises(InputError, match="can stand still"):
         describe_episodes(restless, NavEvaluation())
+
+
+def test_the_robot_that_is_judged_is_as_wide_as_it_is_whatever_the_training_takes(monkeypatch):
+    trained = load_config(NavConfig, "nav/motion/walking", ["robot.width=0.4", "robot.min_speed=-0.3"])
+    monkeypatch.setattr("vinl.nav.evaluation.load_config", lambda *_: trained)
+    robot = describe_episodes(None, NavEvaluation()).robot
+    assert (robot.length, robot.width, robot.min_speed) == (0.65, 0.31, 0.0)
+    assert robot.max_speed == trained.robot.max_speed
 
 
 def record(success: bool, spl: float, geodesic: float = 6.0) -> NavRecord:

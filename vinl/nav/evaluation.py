@@ -22,7 +22,7 @@ from vinl.chain.records import RouteRecord
 from vinl.config.errors import InputError
 from vinl.config.limits import check_fields, check_limits
 from vinl.config.loader import build_config, load_config
-from vinl.nav.config import EpisodeConfig, NavCameraConfig, NavConfig
+from vinl.nav.config import EpisodeConfig, NavCameraConfig, NavConfig, RobotConfig
 from vinl.nav.environment import EpisodeEnd, NavEnvironment
 from vinl.nav.home_store import HomeStore
 from vinl.policies.card import PolicyCard, find_previous
@@ -325,7 +325,7 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
         plans=(),
         plans_share=0.0,
     )
-    robot = config.robot
+    robot = replace(RobotConfig(), max_speed=config.robot.max_speed)  # as wide as it is, whatever was trained with
     if card is not None:
         span = VelocityRange.of(card)
         if span.forward_speed[0] > 0 or span.yaw_rate[0] != -span.yaw_rate[1]:
