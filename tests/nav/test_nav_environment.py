@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from vinl.config.errors import InputError
-from vinl.nav.config import EpisodeConfig, ExecutionConfig
+from vinl.nav.config import EpisodeConfig, ExecutionConfig, NavRewardConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.learning_config import NavPpoConfig
 from vinl.policies.places import VIEW
@@ -144,3 +144,14 @@ def test_the_motion_seen_is_what_the_poses_say(config, homes, lowest):
         wanted = torch.as_tensor(VelocityRange((lowest, 1.0)).action(twist[:, [0, 2]]))
         torch.testing.assert_close(environment.observe()[1][:, -2:], wanted, atol=2e-3, rtol=0)
         environment.restart(done)
+
+
+def test_the_price_on_metres_counts_what_a_robot_moves(config, homes):
+    free = NavRewardConfig(success=0.0, progress=0.0, slack=0.0, collision=0.0, near=0.0, scale=1.0)
+    settings = replace(config, num_envs=200, camera=None, reward=replace(free, path=-0.2))
+    environment = NavEnvironment(settings, homes)
+    before = environment.state["position"].clone()
+    step = environment.step(torch.tensor([[1.0, 0.0]]).expand(200, 2))
+    moved = (environment.state["position"] - before).norm(dim=1)
+    torch.testing.assert_close(step.reward[~step.done], -0.2 * moved[~step.done], atol=1e-5, rtol=0)
+    assert (moved[~step.done] == 0).any() and moved[~step.done].max() == pytest.approx(0.5, abs=1e-3)

@@ -284,6 +284,7 @@ class NavRewardConfig:
     Attributes:
         success: once, at the goal.
         progress: for each metre that the geodesic distance shrinks.
+        path: for each metre moved.
         slack: every step.
         collision: every step that is cancelled because the robot would touch something.
         near: every step that ends with a wall or furniture within ``margin`` of the rectangle: feet swing beside and
@@ -294,6 +295,7 @@ class NavRewardConfig:
 
     success: float = 10.0
     progress: float = 1.0
+    path: float = 0.0
     slack: float = -0.002
     collision: float = -0.003
     near: float = 0.0

@@ -337,6 +337,7 @@ class NavEnvironment:
         timeout = (state["steps"] >= episodes.steps) & ~success
         done = success | timeout
         reward = rules.progress * (before - state["distance"]) + rules.success * success
+        reward += rules.path * self._moved
         reward += rules.slack + rules.collision * self._blocked + rules.near * self._near
         reward = rules.scale * reward
         self.ended = end_episodes(state, done, success)
