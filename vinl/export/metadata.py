@@ -49,6 +49,8 @@ MEANINGS = {
     "previous_motion": "what the robot did since the last decision, as the action that asks for it: mean forward speed "
     "and yaw rate along the arc between both poses in units of the action's ranges, held to [-1, 1]; zeros when an "
     "episode begins",
+    "previous_step": "how far the robot came since the last decision, by odometry: forward, left and turned, in the "
+    "heading frame of the last decision; zeros when an episode begins",
 }
 """Row of an observation table to what it is."""
 

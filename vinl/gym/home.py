@@ -14,7 +14,7 @@ from jaxtyping import Float, UInt8
 from vinl.chain.choose import choose_locomotor
 from vinl.chain.config import EvaluationConfig
 from vinl.chain.episode import draw_routes, draw_setup
-from vinl.chain.navigators.learned import measure_twist
+from vinl.chain.navigators.learned import measure_twist, step_between
 from vinl.chain.records import plain_record
 from vinl.chain.workers import one_thread
 from vinl.config.errors import InputError
@@ -242,8 +242,9 @@ class HomeEnv(gymnasium.Env):
             if trip.end:
                 break
         twist = measure_twist(before, trip.pose, (trip.steps - began) * CONTROL_DT)[:, [0, 2]]
-        motion = self.velocity_range.action(twist)
-        known = {"action": [action[None]], "motion": [motion], "both": [action[None], motion]}
+        asked, motion = action[None], self.velocity_range.action(twist)
+        came = step_between(before, trip.pose).astype(np.float32)
+        known = {"action": [asked], "motion": [motion], "both": [asked, motion], "step": [asked, came]}
         self._previous = np.concatenate(known[self._knows], 1)
         return touched
 

@@ -316,7 +316,8 @@ class NavConfig:
         iterations: updates of a training.
         seed: of everything random but the homes.
         previous: what a robot knows of its last step: the ``action`` that it asked for [paper], its ``motion`` in the
-            same units, (-1, 0) where the step was cancelled, or ``both``.
+            same units, (-1, 0) where the step was cancelled, ``both``, or ``step``: the action, and how far it came by
+            odometry.
         camera: null: the robot is blind.
         sensors: errors of the camera.
         odometry: errors of where the robot believes to be: distance and bearing of the goal follow from that. An
@@ -346,5 +347,9 @@ class NavConfig:
         check_limits(self, num_envs=(1, 65536), seed=(0, 2**31 - 1))
         if self.previous not in PREVIOUS:
             raise InputError(f"previous must be one of {', '.join(PREVIOUS)}, got {self.previous!r}")
+        if self.network.grid and (self.camera is None or self.previous != "step"):
+            raise InputError(
+                "network.grid needs a camera and previous=step: a grid is kept up from images and odometry"
+            )
         if self.camera is not None and self.camera.missing == "plane" and self.ppo.image_type == "uint8":
             raise InputError("camera.missing=plane needs ppo.image_type=float16: a byte has no room for the mark")

@@ -16,6 +16,7 @@ from vinl.config.errors import InputError
 from vinl.nav.config import NavConfig
 from vinl.nav.home_store import HomeStore
 from vinl.nav.kernels import Robots, aim_cameras, draw_keys, move_robots, place_robots, render_interior, write_rules
+from vinl.policies.nav_actor import DISTANCE_UNIT
 from vinl.policies.places import blank_places, view_places, visit_places
 from vinl.robot.cameras import Camera
 from vinl.sensing.depth import check_device
@@ -27,10 +28,6 @@ from vinl.world.endings import LOOPING_PATHS
 
 _DRAWN_AT_START, _DRAWN_AT_LOOK = 1, 3
 """Rows of random numbers of a step: what the cameras are drawn from, and their images' errors."""
-
-DISTANCE_UNIT = 5.0
-"""The observation holds the distance to the goal in this unit [m]."""
-
 
 STUCK_STEPS = 10
 """An episode that runs out of time after at least so many cancelled steps in a row counts as stuck."""
@@ -148,8 +145,8 @@ class NavStep(NamedTuple):
         depth: (n, H, W) float16 in [0, 1], pixels without a return dealt with as ``camera.missing`` says; of the new
             episode where done. (n, 0, 0) if the robots are blind.
         vector: (n, 5) float32: distance to the goal / 5 m, cosine and sine of its bearing (left is positive), and the
-            previous action or motion, 0 at the start; (n, 7) with both (``NavConfig.previous``). Of the new episode
-            where done.
+            previous action or motion, 0 at the start; (n, 7) with both, (n, 8) with action and step
+            (``NavConfig.previous``). Of the new episode where done.
         reward: (n,) float32.
         done: (n,) bool, an episode ended with this step.
         timeout: (n,) bool, it ended for want of time, not at the goal.
@@ -210,6 +207,8 @@ class NavEnvironment:
         if not config.odometry.is_exact:
             self._odometry = Odometry(config.odometry, n, self.device)
             self.state |= {f"odometry_{name}": tensor for name, tensor in self._odometry.state.items()}
+        if config.previous == "step":
+            self.state["came"] = self._zeros(n, 3)
         if config.ppo.places > 0:
             self.state["places"] = blank_places(n, self.device)
         self._key = self._zeros(n, dtype=torch.int32)
@@ -319,7 +318,7 @@ class NavEnvironment:
         state, rules = self.state, self.config.reward
         state["action"].copy_(action.detach()).clamp_(-1.0, 1.0)
         state["chance"][1] += 1
-        before, place = state["distance"].clone(), state["position"].clone()
+        before, place, believed = state["distance"].clone(), state["position"].clone(), self._believe().clone()
         self._launch(
             move_robots,
             self.num_envs,
@@ -327,6 +326,8 @@ class NavEnvironment:
         )
         if self._odometry is not None:
             self._odometry.advance(place, state["position"])
+        if "came" in state:
+            state["came"].copy_(_step_between(believed, self._believe()))
         self._visit()
         state["steps"] += 1
         state["path"] += self._moved
@@ -383,6 +384,8 @@ class NavEnvironment:
             self._forget(chosen)
         for name in ("steps", "path", "collisions", "in_a_row"):
             state[name].masked_fill_(chosen, 0.0)
+        if "came" in state:
+            state["came"].masked_fill_(chosen[:, None], 0.0)
         state["action"].masked_fill_(chosen[:, None], 0.0)
         state["start_distance"].copy_(torch.where(chosen, state["distance"], state["start_distance"]))
         self._observation = None
@@ -412,16 +415,15 @@ class NavEnvironment:
 
     def _look(self, rows: Tensor) -> tuple[Tensor, Tensor]:
         n, state = self.num_envs, self.state
-        place, yaw = state["position"], state["yaw"]
-        if self._odometry is not None:
-            believed = self._odometry.state["estimate"]
-            place, yaw = believed[:, :2], yaw + believed[:, 2]
-        to_goal = self.goals() - place
-        bearing = torch.atan2(to_goal[:, 1], to_goal[:, 0]) - yaw
+        believed = self._believe()
+        to_goal = self.goals() - believed[:, :2]
+        bearing = torch.atan2(to_goal[:, 1], to_goal[:, 0]) - believed[:, 2]
         distance = torch.linalg.vector_norm(to_goal, dim=1) / DISTANCE_UNIT
         last = [state["previous"]]
         if self.config.previous == "both":
             last.insert(0, state["action"])
+        if self.config.previous == "step":
+            last = [state["action"], state["came"]]
         vector = torch.cat([torch.stack([distance, bearing.cos(), bearing.sin()], 1), *last], 1)[rows]
         if self.camera is None or self._sensor is None:
             return torch.zeros(len(rows), 0, 0, dtype=torch.float16, device=self.device), vector
@@ -435,8 +437,23 @@ class NavEnvironment:
             depth = self._sensor.spoil(depth, rows, self._key[rows], at, turned, unit=self.camera.far)
         return settle_missing(self.camera.missing, depth, ~(depth > 0)), vector
 
+    def _believe(self) -> Float[Tensor, "n 3"]:
+        """Where the robots believe to be, x, y [m] and heading [rad]."""
+        place, yaw = self.state["position"], self.state["yaw"]
+        if self._odometry is not None:
+            believed = self._odometry.state["estimate"]
+            place, yaw = believed[:, :2], yaw + believed[:, 2]
+        return torch.cat([place, yaw[:, None]], 1)
+
     def _launch(self, kernel: Any, dim: int | tuple[int, ...], inputs: list[Any]) -> None:
         launch(kernel, dim, [self._wrapped[x] if isinstance(x, str) else x for x in inputs], self.device)
 
     def _zeros(self, *shape: int, dtype: torch.dtype = torch.float32) -> Tensor:
         return torch.zeros(*shape, dtype=dtype, device=self.device)
+
+
+def _step_between(before: Float[Tensor, "n 3"], after: Float[Tensor, "n 3"]) -> Float[Tensor, "n 3"]:
+    """From one pose to the next, in the heading frame of the first [m, m, rad]."""
+    x, y, turn = (after - before).unbind(1)
+    c, s = before[:, 2].cos(), before[:, 2].sin()
+    return torch.stack([c * x + s * y, c * y - s * x, torch.atan2(turn.sin(), turn.cos())], 1)

@@ -24,6 +24,8 @@ class NavNetworkConfig:
         embedding: numbers that goal and previous action become, each.
         hidden, layers: width and layers of the memory.
         memory: ``lstm``, or ``mlp``, which remembers nothing.
+        grid: whether an occupancy grid is kept up from the images, and a path planned on it that the network is told
+            of; needs ``previous: step``.
     """
 
     vision: str = "resnet18"
@@ -33,6 +35,7 @@ class NavNetworkConfig:
     hidden: int = 512
     layers: int = 2
     memory: str = "lstm"
+    grid: bool = False
 
     def __post_init__(self) -> None:
         if self.vision not in VISIONS:

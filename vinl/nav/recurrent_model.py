@@ -19,7 +19,7 @@ from vinl.nav.config import NavConfig
 from vinl.policies.card import PolicyCard
 from vinl.policies.depth_memory import State
 from vinl.policies.io import load_policy
-from vinl.policies.nav_actor import PREVIOUS_SIZE, NavActor
+from vinl.policies.nav_actor import PREVIOUS_SIZE, STEP_SIZE, NavActor
 from vinl.policies.networks import PolicyNetwork
 
 
@@ -214,8 +214,12 @@ def build_actor(config: NavConfig) -> NavActor:
     image: dict[str, Any] = {"vision": "none", "height": 1, "width": 1}
     if camera is not None:
         image = {"height": camera.height, "width": camera.width, "channels": 2 if camera.missing == "plane" else 1}
-    previous = PREVIOUS_SIZE * (2 if config.previous == "both" else 1)
-    return NavActor(**{**asdict(config.network), **image, "previous": previous})
+    previous = {"both": 2 * PREVIOUS_SIZE, "step": PREVIOUS_SIZE + STEP_SIZE}.get(config.previous, PREVIOUS_SIZE)
+    sizes = asdict(config.network)
+    if sizes.pop("grid"):
+        assert camera is not None  # held to by the config
+        sizes["grid"] = camera.record().describe()
+    return NavActor(**{**sizes, **image, "previous": previous})
 
 
 def load_start(policy: str, config: NavConfig) -> tuple[dict[str, torch.Tensor], PolicyCard]:

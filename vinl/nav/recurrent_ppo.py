@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import math
-from typing import Any
+from typing import Any, cast
 
 import torch
 from tensordict import TensorDict
@@ -19,7 +19,8 @@ from vinl.config.errors import InputError
 from vinl.nav.compiled_vision import CompiledVision
 from vinl.nav.config import NavConfig
 from vinl.nav.learning_config import NavPpoConfig
-from vinl.nav.recurrent_model import Outlook, RecurrentActorCritic, RecurrentStorage
+from vinl.nav.recurrent_model import Outlook, RecurrentActorCritic, RecurrentStorage, as_unit
+from vinl.policies.grid_path import relax
 from vinl.policies.nav_actor import NavActor
 from vinl.policies.places import VIEW
 from vinl.rl.learning_rate import DeviceRate
@@ -71,6 +72,9 @@ class RecurrentPPO:
         if config.compiled and on_gpu and isinstance(vision, nn.Module):
             self._compiled = CompiledVision(vision)  # fuses what lies between convolutions
         self._state = tuple(part.clone() for part in storage.state)
+        self._grid = model.actor.initial_grid(storage.robots, self.device) if isinstance(model.actor, NavActor) else ()
+        if self._grid and config.compiled and on_gpu:
+            model.actor.spread = torch.compile(relax, dynamic=False)  # type: ignore[assignment]
         self._fresh = torch.ones(storage.robots, dtype=torch.bool, device=self.device)
         self._sums = torch.zeros(len(_SUMS), device=self.device)
         self._kl = torch.zeros((), device=self.device)
@@ -118,8 +122,9 @@ class RecurrentPPO:
         """Advantages of the roll-out, normalised; ``observation`` is the one after its last step."""
         st, s = self.storage, self.config
         depth = st.as_stored(observation["depth"])[None] if st.depth is not None else None
+        vector, _ = self._plan(depth, observation["vector"])
         with torch.no_grad():
-            seen = self._look(depth, observation["vector"][None], self._state, self._fresh[None])
+            seen = self._look(depth, vector[None], self._state, self._fresh[None])
         st.estimate_advantages(seen.value[0], s.gamma, s.lam)
         mean = st.advantages.mean()
         self.peers.average(mean)
@@ -164,7 +169,7 @@ class RecurrentPPO:
             "model": self.model.state_dict(),
             "optimizer": self.optimizer.state_dict(),
             "learning_rate": self.rate.read(),
-            "memory": [part.clone() for part in self._state],
+            "memory": [part.clone() for part in (*self._state, *self._grid)],
             "fresh": self._fresh.clone(),
         }
 
@@ -175,20 +180,32 @@ class RecurrentPPO:
         self.rate.set(saved["learning_rate"])
         self.rate.bind(self.optimizer)
         if len(saved["fresh"]) == len(self._fresh):
-            self._remember(tuple(saved["memory"]))
+            self._remember(tuple(saved["memory"][: len(self._state)]))
+            for part, now in zip(self._grid, saved["memory"][len(self._state) :], strict=True):
+                part.copy_(now)
             self._fresh.copy_(saved["fresh"])
         return True
 
     def _keep(self, observation: TensorDict, t: int) -> Tensor | None:
         """Store the observation of step t; returns its images (1, n, height, width)."""
         st = self.storage
-        st.vector[t] = observation["vector"]
         if st.hidden is not None:
             st.hidden[t] = observation["hidden"]
-        if st.depth is None:
-            return None
-        st.depth[t] = st.as_stored(observation["depth"])
-        return st.depth[t][None]
+        depth: Tensor | None = None
+        if st.depth is not None:
+            st.depth[t] = st.as_stored(observation["depth"])
+            depth = st.depth[t][None]
+        st.vector[t], grid = self._plan(depth, observation["vector"])
+        for part, now in zip(self._grid, grid, strict=True):
+            part.copy_(now)
+        return depth
+
+    def _plan(self, depth: Tensor | None, vector: Tensor) -> tuple[Tensor, tuple[Tensor, ...]]:
+        """The vector with what is planned on the robots' grids, once in a roll-out, for it has no weights to learn."""
+        if not self._grid:
+            return vector, ()
+        assert depth is not None
+        return cast(NavActor, self.model.actor).plan(as_unit(depth[0]), vector, self._grid, self._fresh)
 
     def _remember(self, state: tuple[Tensor, ...]) -> None:
         for part, now in zip(self._state, state, strict=True):
@@ -247,9 +264,9 @@ def build_storage(config: NavConfig, actor: NavActor, device: torch.device | str
         config.num_envs,
         actor.image,
         config.ppo.image_type,
-        actor.observation_size,
+        actor.input_size,
         actor.action_size,
-        actor.initial_state(config.num_envs, device),
+        actor.memory.initial_state(config.num_envs, device),
         device,
         hidden=count_guesses(config.ppo),
     )

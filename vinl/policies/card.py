@@ -85,6 +85,10 @@ PREVIOUS_MOTION: dict[str, Any] = {"name": "previous_motion", "size": 2, "scale"
 action that asks for just that: (2 x mean forward speed / (1 m/s) - 1, mean yaw rate / (60 deg/s)), held to [-1, 1];
 (-1, 0) is a robot that stood or was stopped. Zero when an episode begins."""
 
+PREVIOUS_STEP: dict[str, Any] = {"name": "previous_step", "size": 3, "scale": [1.0], "unit": "m, m, rad"}
+"""What a navigator may observe behind its last action: how far it came since its last decision by odometry, ahead, to
+the left and turned, in the heading frame that it had then. Zero when an episode begins."""
+
 FORWARD_SPEED = (0.0, 1.0)
 """Forward speed at the actions -1 and 1 [m/s] [paper]."""
 
@@ -132,21 +136,28 @@ def find_gait(card: PolicyCard) -> GaitConfig | None:
     return None if card.gait is None else build_config(GaitConfig, card.gait, source=f"{card.name}: gait")
 
 
-PREVIOUS = ("action", "motion", "both")
+PREVIOUS = ("action", "motion", "both", "step")
 """What a navigator may know of its last step."""
 
 
 def navigation_table(previous: str = "action") -> list[dict[str, Any]]:
     """What a navigator observes: the goal, and of its last step the action, the motion (``PREVIOUS_MOTION``) or both,
-    the action first."""
+    the action first; ``step``: the action and the ``PREVIOUS_STEP``."""
     goal, action = NAVIGATION_TABLE[:2], NAVIGATION_TABLE[2]
-    last = {"action": (action,), "motion": (PREVIOUS_MOTION,), "both": (action, PREVIOUS_MOTION)}[previous]
+    last = {
+        "action": (action,),
+        "motion": (PREVIOUS_MOTION,),
+        "both": (action, PREVIOUS_MOTION),
+        "step": (action, PREVIOUS_STEP),
+    }[previous]
     return [dict(row) for row in (*goal, *last)]
 
 
 def find_previous(card: PolicyCard) -> str:
     """What a navigator's card lists of its last step: one of ``PREVIOUS``."""
     names = {row.get("name") for row in card.observation}
+    if PREVIOUS_STEP["name"] in names:
+        return "step"
     if PREVIOUS_MOTION["name"] not in names:
         return "action"
     return "both" if NAVIGATION_TABLE[2]["name"] in names else "motion"

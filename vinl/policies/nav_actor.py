@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
+from vinl.config.loader import build_config
 from vinl.policies.depth_memory import DepthMemory, State
+from vinl.policies.grid_path import PLAN_SIZE, Relax, plan_path, relax
 from vinl.policies.networks import PolicyNetwork
+from vinl.policies.occupancy_grid import GridState, OccupancyGrid
+from vinl.robot.cameras import Camera
 
 GOAL_SIZE, PREVIOUS_SIZE = 3, 2
 """Numbers that say where the goal is (distance / 5 m, cosine and sine of the bearing), and of the last action."""
 
 OBSERVATION_SIZE, ACTION_SIZE = GOAL_SIZE + PREVIOUS_SIZE, 2
+
+STEP_SIZE = 3
+"""Numbers at the end of the observation that say how far the robot came [m, m, rad], if it is told."""
+
+DISTANCE_UNIT = 5.0
+"""The observation holds the distance to the goal in this unit [m]."""
 
 _MEAN_GAIN = 0.01
 """Gain of the last layer: an untrained navigator asks for the middle of its ranges [ViNL code]."""
@@ -31,12 +43,16 @@ class NavActor(PolicyNetwork):
         embedding: numbers that goal and previous action become, each.
         memory: ``"lstm"`` or ``"mlp"``.
         planes: channels of the ResNet's first stage.
-        previous: numbers on the last step: 2 of the action or the motion, 4 of both.
+        previous: numbers on the last step: 2 of the action or the motion, 4 of both, 5 of the action and the step.
         channels: of the image: 1, or 2 with one for the pixels without a return.
+        grid: record of the camera whose images an occupancy grid is kept up from, and a path planned on it that the
+            network is told of; ``previous`` is 5 then. None: no grid.
 
     Attributes:
         image: (height, width) [pixels], or None if blind.
         feature_size: numbers that ``look`` returns.
+        input_size: numbers that ``look`` takes: those observed, and the plan's.
+        spread: what distances are spread with on the grid; may be replaced by the same, compiled.
     """
 
     observation_size = OBSERVATION_SIZE
@@ -55,10 +71,15 @@ class NavActor(PolicyNetwork):
         planes: int = 32,
         previous: int = PREVIOUS_SIZE,
         channels: int = 1,
+        grid: dict[str, Any] | None = None,
     ) -> None:
         super().__init__()
         self.observation_size = GOAL_SIZE + previous
         self.keep_arguments(locals())
+        self.grid = None if grid is None else OccupancyGrid(build_config(Camera, grid))
+        self.spread: Relax = relax
+        self.input_size = self.observation_size + (PLAN_SIZE if self.grid else 0)
+        previous += PLAN_SIZE if self.grid else 0
         self.goal = nn.Linear(GOAL_SIZE, embedding)
         self.previous = nn.Linear(previous, embedding)
         self.memory = DepthMemory(
@@ -70,8 +91,12 @@ class NavActor(PolicyNetwork):
         nn.init.zeros_(self.mean.bias)
 
     def initial_state(self, n: int, device: torch.device | str | None = None) -> State:
-        """The memory of n robots that have seen nothing."""
-        return self.memory.initial_state(n, device)
+        """The memory of n robots that have seen nothing; with a grid, that is the last part (``GridState``)."""
+        return (*self.memory.initial_state(n, device), *self.initial_grid(n, device))
+
+    def initial_grid(self, n: int, device: torch.device | str | None = None) -> State:
+        """The grids of n robots that have seen nothing; nothing without one."""
+        return () if self.grid is None else tuple(self.grid.start(n, device))
 
     def forward(
         self,
@@ -91,8 +116,31 @@ class NavActor(PolicyNetwork):
         Returns:
             (t, n, 2) in [-1, 1]: forward speed is (a0 + 1) / 2 m/s, yaw rate a1 x pi/3 rad/s; and the last state.
         """
-        feature, state = self.look(depth, vector, state, fresh)
-        return self.choose(feature), state
+        if self.grid is None:
+            feature, state = self.look(depth, vector, state, fresh)
+            return self.choose(feature), state
+        memory, grid = state[: -len(GridState._fields)], state[-len(GridState._fields) :]
+        told = []
+        for k in range(len(vector)):
+            assert depth is not None
+            more, grid = self.plan(depth[k], vector[k], grid, fresh[k])
+            told.append(more)
+        feature, memory = self.look(depth, torch.stack(told), memory, fresh)
+        return self.choose(feature), (*memory, *grid)
+
+    @torch.no_grad()
+    def plan(
+        self,
+        depth: Float[Tensor, "n height width"],
+        vector: Float[Tensor, "n k"],
+        grid: State,
+        fresh: Bool[Tensor, " n"],
+    ) -> tuple[Float[Tensor, "n input"], State]:
+        """One step's vector with what is planned behind it, and the grid after the step; holds no weights."""
+        assert self.grid is not None
+        now = self.grid.see(GridState(*grid), depth, vector[:, -STEP_SIZE:], fresh)
+        goal = vector[:, 1:GOAL_SIZE] * (vector[:, :1] * DISTANCE_UNIT)
+        return torch.cat([vector, plan_path(now, goal, self.spread)], 1), tuple(now)
 
     def look(
         self,
@@ -101,7 +149,8 @@ class NavActor(PolicyNetwork):
         state: State,
         fresh: Bool[Tensor, "t n"],
     ) -> tuple[Float[Tensor, "t n hidden"], State]:
-        """Features of t steps in a row, arguments as for ``forward``; a critic may share them."""
+        """Features of t steps in a row, arguments as for ``forward``; the vector is ``plan``'s if there is a grid, and
+        the state is the network's alone. A critic may share the features."""
         parts = [self.goal(vector[..., :GOAL_SIZE]), self.previous(vector[..., GOAL_SIZE:])]
         return self.memory(depth, torch.cat(parts, -1), state, fresh)
 

@@ -39,6 +39,13 @@ def measure_twist(
     return np.stack([forward / chord, left / chord, turn], 1) / period
 
 
+def step_between(before: Float[np.ndarray, "n 3"], after: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    """From one pose (x, y [m] and yaw [rad]) to the next, in the heading frame of the first [m, m, rad]."""
+    x, y, turn = (after - before).T
+    c, s = np.cos(before[:, 2]), np.sin(before[:, 2])
+    return np.stack([c * x + s * y, c * y - s * x, wrap_angle(turn)], 1)
+
+
 class DeadReckoning:
     """The odometry of n robots; the same key gives the same errors.
 
@@ -73,9 +80,10 @@ class LearnedNavigator:
     A policy whose card lists ``previous_motion`` gets what the robot did since the last decision, from its poses (from
     odometry, on a robot), as in its training (``vinl.policies.card.PREVIOUS_MOTION``): a robot that walks against a
     wall reads that it stands. One whose card lists ``previous_action`` gets what it asked for; a card may list both.
+    ``previous_step`` is how far it came since then, by the same poses.
 
     Args:
-        policy: observes (n, 5 or 7): distance / 5 m, cosine and sine of the bearing, and its last step; and depth.
+        policy: observes (n, 5, 7 or 8): distance / 5 m, cosine and sine of the bearing, and its last step; and depth.
         period: between two decisions [s].
 
     Attributes:
@@ -128,9 +136,11 @@ class LearnedNavigator:
         """These robots do something else than the policy said: that is what it knows as its last action."""
         self._last[which] = self._range.action(velocity[which])
 
-    def _measure(self, pose: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
-        """The motion since the last decision in units of the action; zero at the first."""
+    def _measure(self, pose: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n k"]:
+        """The motion since the last decision in units of the action, or the step; zero at the first."""
         before, self._pose = self._pose, pose.copy()
         if before is None:
-            return np.zeros((len(pose), 2), np.float32)
+            return np.zeros((len(pose), 3 if self._previous == "step" else 2), np.float32)
+        if self._previous == "step":
+            return step_between(before, pose).astype(np.float32)
         return self._range.action(measure_twist(before, pose, self._period)[:, [0, 2]])

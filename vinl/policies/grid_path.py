@@ -1,0 +1,117 @@
+"""The shortest path to the goal on an occupancy grid that takes what is unknown for free: where it leads, and how long
+it is. With every wall that is seen it is planned anew; a dead end is left as soon as the grid shows that it is one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Float
+from torch import Tensor
+
+from vinl.policies.occupancy_grid import CELL, SIDE, GridState, cell_of
+
+AHEAD = (3, 6, 12)
+"""The path is told at so many cells from the robot: 0.75 to 4 m."""
+
+PLAN_SIZE = 2 * len(AHEAD) + 2
+"""Numbers that ``plan_path`` gives."""
+
+ROUNDS, STEPS = 12, 8
+"""Distances spread by one cell in each step: paths of up to 96 cells, 24 m, within the grid."""
+
+_OCCUPIED, _FREE = 0.2, -0.1
+"""Cells above the one are taken for occupied, below the other for free."""
+
+_NEAR, _AROUND, _UNSURE, _THROUGH = 2.0, 0.5, 6.0, 20.0
+"""What a metre costs, beyond its length: beside an occupied cell; one cell farther away; beside one and not known to be
+free, which is how walls look that were seen in part; and through it, for no grid is so sure that there is no path."""
+
+_FAR = 1e3
+"""Before anything is known of a cell's distance [m]."""
+
+Relax = Callable[[Tensor, Tensor], Tensor]
+
+
+def relax(distance: Float[Tensor, "n side side"], cost: Float[Tensor, "n side side"]) -> Float[Tensor, "n side side"]:
+    """Distances after ``STEPS`` steps to the eight neighbours, whose cells are crossed at this cost [m]."""
+    diagonal = cost * 2.0**0.5
+    for _ in range(STEPS):
+        d = F.pad(distance, (1, 1, 1, 1), value=_FAR)
+        up, down, middle = d[:, :-2], d[:, 2:], d[:, 1:-1]
+        beside = torch.minimum(middle[..., :-2], middle[..., 2:])
+        straight = torch.minimum(torch.minimum(up[..., 1:-1], down[..., 1:-1]), beside)
+        upper, lower = torch.minimum(up[..., :-2], up[..., 2:]), torch.minimum(down[..., :-2], down[..., 2:])
+        oblique = torch.minimum(upper, lower)
+        distance = torch.minimum(distance, torch.minimum(straight + cost, oblique + diagonal))
+    return distance
+
+
+def plan_path(state: GridState, goal: Float[Tensor, "n 2"], spread: Relax = relax) -> Float[Tensor, "n plan"]:
+    """What a robot is told of the path.
+
+    Args:
+        state: of the grids.
+        goal: in the heading frame [m]; outside of the grid the way to it is taken for straight.
+        spread: ``relax``, or the same compiled.
+
+    Returns:
+        Cosine and sine of the bearing of the path's points ``AHEAD``; its length / 10 m, held to 4; and how much longer
+        it is than the straight line / 5 m, held to 4.
+    """
+    pose, n = state.pose[0], state.pose.shape[1]
+    c, s = pose[:, 2].cos(), pose[:, 2].sin()
+    towards = torch.stack([c * goal[:, 0] - s * goal[:, 1], s * goal[:, 0] + c * goal[:, 1]], 1)  # in the grid's axes
+    here = cell_of(pose)
+    around = torch.arange(SIDE, device=pose.device) - SIDE // 2
+    column, row = ((here[:, k, None] + around).remainder(SIDE) for k in (0, 1))
+    index = (column[:, :, None] * SIDE + row[:, None, :]).flatten(1)
+    cells = state.cells[0].gather(1, index).reshape(n, SIDE, SIDE)  # the robot's is in the middle
+    middles = (here[..., None] + around + 0.5) * CELL - pose[:, :2, None]  # (n, 2, SIDE) from the robot
+    x, y = middles[:, 0, :, None] - towards[:, :1, None], middles[:, 1, None, :] - towards[:, 1:, None]
+    straight = (x * x + y * y).sqrt()
+    distance = spread_distances(cells, straight, spread)
+    return _describe(distance, middles, towards, c, s)
+
+
+def spread_distances(
+    cells: Float[Tensor, "n side side"], straight: Float[Tensor, "n side side"], spread: Relax = relax
+) -> Float[Tensor, "n side side"]:
+    """Length of the path from each cell to the goal [m], with what it costs to come near to something.
+
+    Args:
+        cells: see ``GridState``, the robot's in the middle.
+        straight: distance of each cell to the goal [m].
+    """
+    solid = (cells > _OCCUPIED).float()
+    near, around = F.max_pool2d(solid, 3, 1, 1), F.max_pool2d(solid, 5, 1, 2)
+    unsure = near * (cells > _FREE)
+    cost = CELL * (1 + (_NEAR - _AROUND) * near + _AROUND * around + _UNSURE * unsure + _THROUGH * solid)
+    edge = torch.ones_like(solid[:1])
+    edge[:, 1:-1, 1:-1] = 0.0
+    distance = torch.where((edge > 0) | (straight < 0.75 * CELL), straight, _FAR)
+    watched = distance.device.type == "cpu" and not torch.compiler.is_compiling()
+    for _ in range(ROUNDS):
+        before, distance = distance, spread(distance, cost)
+        if watched and torch.equal(before, distance):  # elsewhere to look would be to wait
+            break
+    return distance
+
+
+def _describe(distance: Tensor, middles: Tensor, towards: Tensor, c: Tensor, s: Tensor) -> Tensor:
+    n, rows = len(distance), torch.arange(len(distance), device=distance.device)
+    flat = distance.flatten(1)
+    offsets = torch.tensor([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)], device=distance.device)
+    at = torch.full((n, 2), SIDE // 2, device=distance.device)
+    told: list[Tensor] = []
+    for k in range(1, AHEAD[-1] + 1):  # downhill, cell by cell
+        around = (at[:, None] + offsets).clamp(0, SIDE - 1)
+        best = flat.gather(1, around[..., 0] * SIDE + around[..., 1]).argmin(1)
+        at = around[rows, best]
+        if k in AHEAD:
+            to_x, to_y = (middles[:, axis].gather(1, at[:, axis : axis + 1])[:, 0] for axis in (0, 1))
+            away = (to_x * to_x + to_y * to_y).sqrt().clamp(min=0.5 * CELL)
+            told += [(c * to_x + s * to_y) / away, (c * to_y - s * to_x) / away]
+    length, line = distance[:, SIDE // 2, SIDE // 2], (towards * towards).sum(1).sqrt()
+    return torch.stack([*told, (length / 10).clamp(max=4), ((length - line) / 5).clamp(-1, 4)], 1)

@@ -1,0 +1,148 @@
+"""An occupancy grid of what a robot has seen around it, kept up from depth images and odometry by tensor operations."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor, nn
+
+from vinl.robot.cameras import Camera
+
+CELL = 0.25
+"""Side of a cell [m]: the narrowest door, 0.6 m, leaves at least one free."""
+
+SIDE = 64
+"""Cells along each side: 16 m. Cells that the robot leaves behind are used again for those ahead."""
+
+MOUNT_HEIGHT = 0.43
+"""Height of the camera over the floor [m] [recorded: 0.424 to 0.439]."""
+
+_LOWEST, _RISE, _HIGHEST = 0.22, 0.05, 1.7
+"""Points are obstacles from this height on [m], which is above what legs step over; so much higher for each metre of
+distance, for the camera's pitch is known to a few degrees; and up to this height, below the lintels of doors."""
+
+_SEEN = 8.0
+"""Points farther away are not used [m]: a degree of the heading moves them by half a cell."""
+
+_FREE_STEP = 0.2
+"""Between the points of a ray whose cells are free [m]."""
+
+_HIT, _PASSED = 0.6, 0.35
+"""How far a cell moves to occupied (1) where a ray ends, and to free (-1) where one passes."""
+
+
+class GridState(NamedTuple):
+    """The grids of n robots.
+
+    Attributes:
+        pose: (1, n, 3) x, y [m] and heading [rad] since the episode began, by odometry.
+        cells: (1, n, SIDE²) from free (-1) over unknown (0) to occupied (1).
+    """
+
+    pose: Tensor
+    cells: Tensor
+
+
+class OccupancyGrid(nn.Module):
+    """Grids of n robots with a camera; holds no weights.
+
+    Args:
+        camera: what the images are of, level.
+    """
+
+    left: Tensor
+    down: Tensor
+
+    def __init__(self, camera: Camera) -> None:
+        super().__init__()
+        self.far, self.ahead = camera.far, camera.position[0]
+        tan_x, tan_y = camera.tan_half
+        across = (torch.arange(camera.width, device="cpu") + 0.5) / camera.width * 2 - 1
+        down = (torch.arange(camera.height, device="cpu") + 0.5) / camera.height * 2 - 1
+        self.register_buffer("left", -across * tan_x, persistent=False)
+        self.register_buffer("down", down * tan_y, persistent=False)
+
+    @staticmethod
+    def start(n: int, device: torch.device | str | None = None) -> GridState:
+        """Grids of n robots that have seen nothing."""
+        return GridState(torch.zeros(1, n, 3, device=device), torch.zeros(1, n, SIDE**2, device=device))
+
+    def see(
+        self,
+        state: GridState,
+        depth: Float[Tensor, "n height width"],
+        step: Float[Tensor, "n 3"],
+        fresh: Bool[Tensor, " n"],
+    ) -> GridState:
+        """After a step, with what the image shows.
+
+        Args:
+            state: before it.
+            depth: as a fraction of the camera's far limit.
+            step: forward, left [m] and turn [rad] since the last image, in the heading frame of that.
+            fresh: an episode begins: nothing is known.
+        """
+        before = torch.where(fresh[:, None], 0.0, state.pose[0])
+        x, y = _turned(before[:, 2:], step[:, :1], step[:, 1:2])
+        after = torch.where(fresh[:, None], 0.0, before + torch.cat([x, y, step[:, 2:]], 1))
+        cells = torch.where(fresh[:, None], 0.0, state.cells[0]).reshape(-1, SIDE, SIDE)
+        stale = _place(cell_of(before)) != _place(cell_of(after))  # (n, 2, SIDE) stand for other ground now
+        cells = torch.where(stale[:, 0, :, None] | stale[:, 1, None, :], 0.0, cells).flatten(1)
+        hit, passed = self._trace(depth.float() * self.far, after)
+        moved = torch.where(passed > 0, cells - _PASSED * (cells + 1), cells)
+        return GridState(after[None], torch.where(hit > 0, cells + _HIT * (1 - cells), moved)[None])
+
+    def _trace(
+        self, depth: Float[Tensor, "n height width"], pose: Float[Tensor, "n 3"]
+    ) -> tuple[Float[Tensor, "n cells"], Float[Tensor, "n cells"]]:
+        """Cells in which a ray ends, and cells that one passes: 1, others 0. Each column of the image is a ray, to the
+        nearest obstacle in it."""
+        height = MOUNT_HEIGHT - self.down[:, None] * depth
+        solid = (depth > 0) & (depth < 0.99 * self.far) & (height > _LOWEST + _RISE * depth) & (height < _HIGHEST)
+        ends = torch.where(solid, depth, 2 * self.far).amin(1)  # (n, width)
+        reach = torch.minimum(ends, depth.amax(1)).clamp(max=_SEEN)
+        along = (torch.arange(int(_SEEN / _FREE_STEP), device=depth.device) + 0.5) * _FREE_STEP
+        free = (along[:, None] < reach[:, None] - 0.5 * CELL).flatten(1)
+        ahead = (self.ahead + along)[:, None].expand(-1, len(self.left)).flatten()
+        left = (along[:, None] * self.left).flatten()
+        passed = self._mark(pose, ahead[None], left[None], free)
+        passed = torch.maximum(passed, self._mark(pose, *(torch.zeros_like(pose[:, :1]),) * 2, free[:, :1] | True))
+        end = ends + 0.2 * CELL  # in the cell behind the surface, not before it
+        return self._mark(pose, self.ahead + end, end * self.left, ends < _SEEN), passed
+
+    @staticmethod
+    def _mark(
+        pose: Float[Tensor, "n 3"],
+        ahead: Float[Tensor, "*n k"],
+        left: Float[Tensor, "*n k"],
+        chosen: Bool[Tensor, "n k"],
+    ) -> Float[Tensor, "n cells"]:
+        """1 in the cells of the points of the heading frame that are chosen and lie on the grid."""
+        x, y = _turned(pose[:, 2:], ahead, left)
+        limit = (SIDE // 2 - 1) * CELL
+        chosen = chosen & (x.abs() < limit) & (y.abs() < limit)
+        index = index_of(torch.stack([x, y], -1) + pose[:, None, :2])
+        return torch.zeros(len(pose), SIDE**2, device=pose.device).scatter_reduce(1, index, chosen.float(), "amax")
+
+
+def cell_of(place: Float[Tensor, "*n k"]) -> Int[Tensor, "*n 2"]:
+    """Column and row, not wrapped, of a place [m]."""
+    return torch.floor(place[..., :2] / CELL).long()
+
+
+def index_of(place: Float[Tensor, "*n 2"]) -> Int[Tensor, "*n"]:
+    """Number of the cell of a place [m]."""
+    column, row = cell_of(place).remainder(SIDE).unbind(-1)
+    return column * SIDE + row
+
+
+def _turned(angle: Float[Tensor, "n 1"], x: Float[Tensor, "*n k"], y: Float[Tensor, "*n k"]) -> tuple[Tensor, Tensor]:
+    c, s = torch.cos(angle), torch.sin(angle)
+    return c * x - s * y, s * x + c * y
+
+
+def _place(cell: Int[Tensor, "n 2"]) -> Int[Tensor, "n 2 side"]:
+    """Which of the cells that do not move each column and row stands for with the robot in this one."""
+    return cell[..., None] + (torch.arange(SIDE, device=cell.device) - cell[..., None] + SIDE // 2).remainder(SIDE)
