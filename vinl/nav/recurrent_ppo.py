@@ -16,11 +16,11 @@ from tensordict import TensorDict
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
+from vinl.nav.compiled_planner import compile_relax
 from vinl.nav.compiled_vision import CompiledVision
 from vinl.nav.config import NavConfig
 from vinl.nav.learning_config import NavPpoConfig
 from vinl.nav.recurrent_model import Outlook, RecurrentActorCritic, RecurrentStorage, as_unit
-from vinl.policies.grid_path import relax
 from vinl.policies.nav_actor import NavActor
 from vinl.policies.places import VIEW
 from vinl.rl.learning_rate import DeviceRate
@@ -74,7 +74,7 @@ class RecurrentPPO:
         self._state = tuple(part.clone() for part in storage.state)
         self._grid = model.actor.initial_grid(storage.robots, self.device) if isinstance(model.actor, NavActor) else ()
         if self._grid and config.compiled and on_gpu:
-            model.actor.spread = torch.compile(relax, dynamic=False)  # type: ignore[assignment]
+            cast(NavActor, model.actor).spread = compile_relax(storage.robots, self.device)
         self._fresh = torch.ones(storage.robots, dtype=torch.bool, device=self.device)
         self._sums = torch.zeros(len(_SUMS), device=self.device)
         self._kl = torch.zeros((), device=self.device)

@@ -94,6 +94,12 @@ class NavActor(PolicyNetwork):
         """The memory of n robots that have seen nothing; with a grid, that is the last part (``GridState``)."""
         return (*self.memory.initial_state(n, device), *self.initial_grid(n, device))
 
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """What the parts of ``initial_state`` are called in an exported file."""
+        network = ("hidden", "cell") if self.memory.remembers else ()
+        return (*network, *(("grid_pose", "grid_cells") if self.grid else ()))
+
     def initial_grid(self, n: int, device: torch.device | str | None = None) -> State:
         """The grids of n robots that have seen nothing; nothing without one."""
         return () if self.grid is None else tuple(self.grid.start(n, device))
