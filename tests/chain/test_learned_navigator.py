@@ -167,11 +167,11 @@ def test_navigators_by_name(tmp_path: Path) -> None:
     assert load_policy(folder).camera == navigator.camera
 
 
-@pytest.mark.parametrize("previous", ["motion", "both"])
+@pytest.mark.parametrize("previous", ["motion", "both", "step"])
 def test_last_motion_instead_of_last_action(two_rooms: FloorPlan, previous: str) -> None:
     """What the card says it observes: how far the robot came, whatever it asked for."""
     network, camera = TinyGuide(), replace(NAVIGATION_CAMERA, height=8, width=12)
-    network.observation_size = 7 if previous == "both" else 5
+    network.observation_size = {"motion": 5, "both": 7, "step": 8}[previous]
     card = navigation_card("guide", network.describe(), camera.describe(), previous)
     navigator = LearnedNavigator(DepthPolicy(network, card))
     task = Task(FreeSpace(two_rooms), sample_start_goals(two_rooms, 1, np.random.default_rng(0), 2.0)[0])
@@ -182,7 +182,10 @@ def test_last_motion_instead_of_last_action(two_rooms: FloorPlan, previous: str)
     (_, first, _), (_, later, _) = network.seen
     np.testing.assert_array_equal(first[0, :, 3:], 0.0)
     # the first stood, the second walked 0.8 m/s and turned by 30 deg/s
-    forward = 0.4 * np.cos(np.pi / 24) / np.sinc(1 / 24) / 0.5
-    np.testing.assert_allclose(later[0, :, -2:], [[-1.0, 0.0], [2 * forward - 1, 0.5]], atol=1e-6)
-    if previous == "both":
+    if previous == "step":
+        np.testing.assert_allclose(later[0, :, -3:], [[0.0, 0.0, 0.0], [0.4, 0.0, np.pi / 12]], atol=1e-6)
+    else:
+        forward = 0.4 * np.cos(np.pi / 24) / np.sinc(1 / 24) / 0.5
+        np.testing.assert_allclose(later[0, :, -2:], [[-1.0, 0.0], [2 * forward - 1, 0.5]], atol=1e-6)
+    if previous != "motion":
         np.testing.assert_allclose(later[0, :, 3:5], [[0.6, 0.0], [-1.0, 1.0]])

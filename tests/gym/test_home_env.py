@@ -180,8 +180,8 @@ def test_what_an_agent_observes_is_what_the_table_says() -> None:
 def test_navigator_reads_how_the_robot_moved_or_what_it_asked_for() -> None:
     action = np.array([0.5, 0.8], np.float32)
     seen = {}
-    for previous in ("action", "motion", "both"):
-        env = HomeEnv(floorplans=PLAN, obstacles="none", cameras={}, overrides=[f"previous={previous}"])
+    for previous in ("action", "motion", "both", "step"):
+        env = HomeEnv(floorplans=PLAN, obstacles="none", cameras={}, overrides=[f"previous={previous}", "network.grid=false"])
         assert not env.reset(seed=0)[0]["vector"][3:].any()
         env.step(action)
         seen[previous] = env.step(action)[0]["vector"][3:]
@@ -189,6 +189,8 @@ def test_navigator_reads_how_the_robot_moved_or_what_it_asked_for() -> None:
     np.testing.assert_allclose(seen["motion"], action, atol=0.25)
     np.testing.assert_array_equal(seen["both"], [*seen["action"], *seen["motion"]])
     assert (seen["motion"] != action).all()
+    np.testing.assert_array_equal(seen["step"][:2], action)
+    np.testing.assert_allclose(seen["step"][4] / (0.5 * np.pi / 3), seen["motion"][1], atol=1e-6)
 
 
 def test_fall_and_time_limit() -> None:

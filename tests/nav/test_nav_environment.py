@@ -12,6 +12,7 @@ from vinl.nav.environment import NavEnvironment
 from vinl.nav.learning_config import NavPpoConfig
 from vinl.policies.places import VIEW
 from vinl.policies.velocity_range import VelocityRange
+from vinl.sensing.sensor_config import OdometryConfig
 
 
 def test_places_are_those_of_the_episode(config, homes):
@@ -105,6 +106,29 @@ def test_a_cancelled_step_is_seen_unless_the_paper_asks(config, homes, previous)
     if previous == "both":
         torch.testing.assert_close(step.vector[~step.done, 3:5], action[~step.done])
     assert (step.vector[step.done, 3:] == 0).all()
+
+
+def test_steps_add_up_to_where_odometry_takes_the_robot_to_be(config, homes):
+    drifts = OdometryConfig(drift=(0.03, 0.03), yaw_bias=0.1)
+    environment = NavEnvironment(
+        replace(config, num_envs=100, camera=None, previous="step", odometry=drifts), homes, seed=1
+    )
+    began = torch.cat([environment.state["position"], environment.state["yaw"][:, None]], 1).clone()
+    believed, over = began.clone(), torch.zeros(100, dtype=torch.bool)
+    assert not environment.observe()[1][:, 3:].any()
+    for k in range(8):
+        action = torch.tensor([[0.6, 0.4 * (-1) ** k]]).expand(100, 2)
+        step = environment.step(action)
+        over |= step.done
+        torch.testing.assert_close(step.vector[~step.done, 3:5], action[~step.done])
+        x, y, turn = step.vector[:, 5:].unbind(1)
+        c, s = believed[:, 2].cos(), believed[:, 2].sin()
+        believed = believed + torch.stack([c * x - s * y, s * x + c * y, turn], 1)
+    estimate = environment.state["odometry_estimate"]
+    torch.testing.assert_close(believed[~over, :2], estimate[~over, :2], atol=1e-4, rtol=0)
+    moved = (environment.state["position"] - began[:, :2]).norm(dim=1)
+    assert (moved[~over] > 1).sum() > 20
+    assert ((believed[:, :2] - environment.state["position"]).norm(dim=1) > 0.02 * moved)[~over & (moved > 1)].all()
 
 
 def test_a_robot_that_pushes_against_a_wall_measures_how_its_legs_sway(config, homes):

@@ -20,6 +20,7 @@ from vinl.world.grid import GridFrame
 from vinl.world.mesh import box_mesh, heightfield_mesh, join_meshes
 
 NOBODY, ALL = torch.tensor([False]), torch.tensor([True])
+HALF = torch.tensor([0.5])  # of the full speed
 WALL = (3.0, 0.0, 0.0, 0.2, 4.0, 0.0, 2.0)  # 2.9 to 3.1 m ahead, 4 m wide, 2 m high
 BLOCK = (1.5, 0.0, 0.0, 0.2, 1.0, 0.0, 0.2)  # of clutter, to be stepped over
 
@@ -35,7 +36,7 @@ def look(boxes: list[tuple[float, ...]], poses: list[tuple[float, float, float]]
         c, s = math.cos(before[2]), math.sin(before[2])
         x, y = pose[0] - before[0], pose[1] - before[1]
         step = torch.tensor([[c * x + s * y, c * y - s * x, pose[2] - before[2]]])
-        state, before = grid.see(state, image, step, ALL if k == 0 else NOBODY), pose
+        state, before = grid.see(state, image, HALF, step, ALL if k == 0 else NOBODY), pose
     return state
 
 
@@ -62,7 +63,7 @@ def test_walls_stay_where_they_are_while_the_robot_walks_and_turns() -> None:
 def test_a_robot_that_begins_anew_knows_nothing_of_before() -> None:
     state = look([WALL], [(0.0, 0.0, 0.0)] * 3)
     blank = torch.zeros(1, NAVIGATION_CAMERA.height, NAVIGATION_CAMERA.width)
-    fresh = OccupancyGrid(NAVIGATION_CAMERA).see(state, blank, torch.tensor([[0.4, 0.0, 0.3]]), ALL)
+    fresh = OccupancyGrid(NAVIGATION_CAMERA).see(state, blank, HALF, torch.tensor([[0.4, 0.0, 0.3]]), ALL)
     assert not fresh.pose.any()
     assert (fresh.cells[0, 0] != 0).nonzero().flatten().tolist() == [int(index_of(torch.zeros(2)))]
 
@@ -71,8 +72,24 @@ def test_ground_left_behind_is_forgotten() -> None:
     state = look([WALL], [(0.0, 0.0, 0.0)] * 3)
     grid, blank = OccupancyGrid(NAVIGATION_CAMERA), torch.zeros(1, NAVIGATION_CAMERA.height, NAVIGATION_CAMERA.width)
     for _ in range(30):
-        state = grid.see(state, blank, torch.tensor([[-0.4, 0.0, 0.0]]), NOBODY)
+        state = grid.see(state, blank, HALF, torch.tensor([[-0.4, 0.0, 0.0]]), NOBODY)
     assert not (state.cells > 0).any()
+
+
+def test_what_holds_the_robot_unseen_is_walked_around_and_tried_again_later() -> None:
+    grid, state = OccupancyGrid(NAVIGATION_CAMERA), drawn([(0.3, 0.3, 0.8, 6.0), (0.3, -3.0, 0.8, -0.3)])  # a gap ahead
+    open_, goal = torch.ones(1, NAVIGATION_CAMERA.height, NAVIGATION_CAMERA.width), torch.tensor([[4.0, 0.0]])
+    assert plan_path(state, goal)[0, 2] > 0.9
+    stood = torch.zeros(1, 3)
+    walks_past = grid.see(state, open_, HALF, torch.tensor([[0.07, 0.0, 0.0]]), NOBODY)
+    waits = grid.see(state, open_, torch.tensor([0.1]), stood, NOBODY)
+    assert not walks_past.bumps.any() and not waits.bumps.any()
+    for _ in range(3):
+        state = grid.see(state, open_, HALF, stood, NOBODY)
+    assert plan_path(state, goal)[0, 2] < 0.5
+    for _ in range(40):
+        state = grid.see(state, open_, torch.zeros(1), stood, NOBODY)
+    assert plan_path(state, goal)[0, 2] > 0.9
 
 
 def drawn(walls: list[tuple[float, float, float, float]]) -> GridState:

@@ -1,4 +1,4 @@
-"""The planner's inner loop through ``torch.compile``, held against itself: what does not compute the same is not used."""
+"""The planner's loop through ``torch.compile``, held against itself: what does not compute the same is not used."""
 
 from __future__ import annotations
 

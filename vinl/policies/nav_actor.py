@@ -98,7 +98,7 @@ class NavActor(PolicyNetwork):
     def state_names(self) -> tuple[str, ...]:
         """What the parts of ``initial_state`` are called in an exported file."""
         network = ("hidden", "cell") if self.memory.remembers else ()
-        return (*network, *(("grid_pose", "grid_cells") if self.grid else ()))
+        return (*network, *(("grid_pose", "grid_cells", "grid_bumps") if self.grid else ()))
 
     def initial_grid(self, n: int, device: torch.device | str | None = None) -> State:
         """The grids of n robots that have seen nothing; nothing without one."""
@@ -144,7 +144,8 @@ class NavActor(PolicyNetwork):
     ) -> tuple[Float[Tensor, "n input"], State]:
         """One step's vector with what is planned behind it, and the grid after the step; holds no weights."""
         assert self.grid is not None
-        now = self.grid.see(GridState(*grid), depth, vector[:, -STEP_SIZE:], fresh)
+        asked = (vector[:, GOAL_SIZE] + 1) / 2  # the action before the step
+        now = self.grid.see(GridState(*grid), depth, asked, vector[:, -STEP_SIZE:], fresh)
         goal = vector[:, 1:GOAL_SIZE] * (vector[:, :1] * DISTANCE_UNIT)
         return torch.cat([vector, plan_path(now, goal, self.spread)], 1), tuple(now)
 

@@ -19,7 +19,7 @@ SIDE = 64
 MOUNT_HEIGHT = 0.43
 """Height of the camera over the floor [m] [recorded: 0.424 to 0.439]."""
 
-_LOWEST, _RISE, _HIGHEST = 0.22, 0.05, 1.7
+_LOWEST, _RISE, _HIGHEST = 0.22, 0.08, 1.7
 """Points are obstacles from this height on [m], which is above what legs step over; so much higher for each metre of
 distance, for the camera's pitch is known to a few degrees; and up to this height, below the lintels of doors."""
 
@@ -33,16 +33,29 @@ _HIT, _PASSED = 0.6, 0.35
 """How far a cell moves to occupied (1) where a ray ends, and to free (-1) where one passes."""
 
 
+_ASKED, _CAME = 0.3, 0.06
+"""A robot that asked for more than this fraction of its full speed, and came no farther than this [m], has met
+something that it does not see: ..."""
+
+_BUMPS = ((0.45, -0.12), (0.45, 0.12))
+"""... these places of its heading frame [m] are occupied, whatever rays pass them, ..."""
+
+_FADE, PASSABLE = 0.98, 0.5
+"""... until this factor at every step has brought it below the other, after 34 steps: then it may try again."""
+
+
 class GridState(NamedTuple):
     """The grids of n robots.
 
     Attributes:
         pose: (1, n, 3) x, y [m] and heading [rad] since the episode began, by odometry.
-        cells: (1, n, SIDE²) from free (-1) over unknown (0) to occupied (1).
+        cells: (1, n, SIDE²) from free (-1) over unknown (0) to occupied (1), by what was seen.
+        bumps: (1, n, SIDE²) 1 where something held the robot, fading.
     """
 
     pose: Tensor
     cells: Tensor
+    bumps: Tensor
 
 
 class OccupancyGrid(nn.Module):
@@ -67,12 +80,14 @@ class OccupancyGrid(nn.Module):
     @staticmethod
     def start(n: int, device: torch.device | str | None = None) -> GridState:
         """Grids of n robots that have seen nothing."""
-        return GridState(torch.zeros(1, n, 3, device=device), torch.zeros(1, n, SIDE**2, device=device))
+        blank = [torch.zeros(1, n, SIDE**2, device=device) for _ in range(2)]
+        return GridState(torch.zeros(1, n, 3, device=device), *blank)
 
     def see(
         self,
         state: GridState,
         depth: Float[Tensor, "n height width"],
+        asked: Float[Tensor, " n"],
         step: Float[Tensor, "n 3"],
         fresh: Bool[Tensor, " n"],
     ) -> GridState:
@@ -81,18 +96,22 @@ class OccupancyGrid(nn.Module):
         Args:
             state: before it.
             depth: as a fraction of the camera's far limit.
+            asked: fraction of the full forward speed that the step was to have.
             step: forward, left [m] and turn [rad] since the last image, in the heading frame of that.
             fresh: an episode begins: nothing is known.
         """
         before = torch.where(fresh[:, None], 0.0, state.pose[0])
         x, y = _turned(before[:, 2:], step[:, :1], step[:, 1:2])
         after = torch.where(fresh[:, None], 0.0, before + torch.cat([x, y, step[:, 2:]], 1))
-        cells = torch.where(fresh[:, None], 0.0, state.cells[0]).reshape(-1, SIDE, SIDE)
         stale = _place(cell_of(before)) != _place(cell_of(after))  # (n, 2, SIDE) stand for other ground now
-        cells = torch.where(stale[:, 0, :, None] | stale[:, 1, None, :], 0.0, cells).flatten(1)
+        unknown = (stale[:, 0, :, None] | stale[:, 1, None, :]).flatten(1) | fresh[:, None]
+        cells, bumps = (torch.where(unknown, 0.0, part[0]) for part in (state.cells, state.bumps))
+        held = (asked > _ASKED) & ((step[:, 0] ** 2 + step[:, 1] ** 2).sqrt() < _CAME) & ~fresh
+        x, y = (torch.tensor([row], device=depth.device) for row in zip(*_BUMPS, strict=True))
+        bumps = torch.maximum(_FADE * bumps, self._mark(after, x, y, held[:, None].expand(-1, len(_BUMPS))))
         hit, passed = self._trace(depth.float() * self.far, after)
         moved = torch.where(passed > 0, cells - _PASSED * (cells + 1), cells)
-        return GridState(after[None], torch.where(hit > 0, cells + _HIT * (1 - cells), moved)[None])
+        return GridState(after[None], torch.where(hit > 0, cells + _HIT * (1 - cells), moved)[None], bumps[None])
 
     def _trace(
         self, depth: Float[Tensor, "n height width"], pose: Float[Tensor, "n 3"]
