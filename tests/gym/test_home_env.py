@@ -181,7 +181,9 @@ def test_navigator_reads_how_the_robot_moved_or_what_it_asked_for() -> None:
     action = np.array([0.5, 0.8], np.float32)
     seen = {}
     for previous in ("action", "motion", "both", "step"):
-        env = HomeEnv(floorplans=PLAN, obstacles="none", cameras={}, overrides=[f"previous={previous}", "network.grid=false"])
+        env = HomeEnv(
+            floorplans=PLAN, obstacles="none", cameras={}, overrides=[f"previous={previous}", "network.grid=false"]
+        )
         assert not env.reset(seed=0)[0]["vector"][3:].any()
         env.step(action)
         seen[previous] = env.step(action)[0]["vector"][3:]

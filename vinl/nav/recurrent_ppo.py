@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import copy
 import math
-from typing import Any, cast
+from typing import Any
 
 import torch
 from tensordict import TensorDict
 from torch import Tensor, nn
 
 from vinl.config.errors import InputError
-from vinl.nav.compiled_planner import compile_relax
 from vinl.nav.compiled_vision import CompiledVision
 from vinl.nav.config import NavConfig
 from vinl.nav.learning_config import NavPpoConfig
 from vinl.nav.recurrent_model import Outlook, RecurrentActorCritic, RecurrentStorage, as_unit
+from vinl.nav.rollout_planner import RolloutPlanner
 from vinl.policies.nav_actor import NavActor
 from vinl.policies.places import VIEW
 from vinl.rl.learning_rate import DeviceRate
@@ -72,9 +72,9 @@ class RecurrentPPO:
         if config.compiled and on_gpu and isinstance(vision, nn.Module):
             self._compiled = CompiledVision(vision)  # fuses what lies between convolutions
         self._state = tuple(part.clone() for part in storage.state)
-        self._grid = model.actor.initial_grid(storage.robots, self.device) if isinstance(model.actor, NavActor) else ()
-        if self._grid and config.compiled and on_gpu:
-            cast(NavActor, model.actor).spread = compile_relax(storage.robots, self.device)
+        self._planner: RolloutPlanner | None = None
+        if isinstance(model.actor, NavActor) and model.actor.grid is not None:
+            self._planner = RolloutPlanner(model.actor, storage.robots, self.device, config.compiled and on_gpu)
         self._fresh = torch.ones(storage.robots, dtype=torch.bool, device=self.device)
         self._sums = torch.zeros(len(_SUMS), device=self.device)
         self._kl = torch.zeros((), device=self.device)
@@ -122,7 +122,7 @@ class RecurrentPPO:
         """Advantages of the roll-out, normalised; ``observation`` is the one after its last step."""
         st, s = self.storage, self.config
         depth = st.as_stored(observation["depth"])[None] if st.depth is not None else None
-        vector, _ = self._plan(depth, observation["vector"])
+        vector = self._plan(depth, observation["vector"])
         with torch.no_grad():
             seen = self._look(depth, vector[None], self._state, self._fresh[None])
         st.estimate_advantages(seen.value[0], s.gamma, s.lam)
@@ -169,7 +169,8 @@ class RecurrentPPO:
             "model": self.model.state_dict(),
             "optimizer": self.optimizer.state_dict(),
             "learning_rate": self.rate.read(),
-            "memory": [part.clone() for part in (*self._state, *self._grid)],
+            "memory": [part.clone() for part in self._state],
+            "grid": [part.clone() for part in self._planner.grid] if self._planner else [],
             "fresh": self._fresh.clone(),
         }
 
@@ -180,9 +181,10 @@ class RecurrentPPO:
         self.rate.set(saved["learning_rate"])
         self.rate.bind(self.optimizer)
         if len(saved["fresh"]) == len(self._fresh):
-            self._remember(tuple(saved["memory"][: len(self._state)]))
-            for part, now in zip(self._grid, saved["memory"][len(self._state) :], strict=True):
-                part.copy_(now)
+            self._remember(tuple(saved["memory"]))
+            if self._planner is not None:
+                for part, now in zip(self._planner.grid, saved["grid"], strict=True):
+                    part.copy_(now)
             self._fresh.copy_(saved["fresh"])
         return True
 
@@ -195,17 +197,16 @@ class RecurrentPPO:
         if st.depth is not None:
             st.depth[t] = st.as_stored(observation["depth"])
             depth = st.depth[t][None]
-        st.vector[t], grid = self._plan(depth, observation["vector"])
-        for part, now in zip(self._grid, grid, strict=True):
-            part.copy_(now)
+        st.vector[t] = self._plan(depth, observation["vector"])
+        if self._planner is not None:
+            self._planner.go_on()
         return depth
 
-    def _plan(self, depth: Tensor | None, vector: Tensor) -> tuple[Tensor, tuple[Tensor, ...]]:
-        """The vector with what is planned on the robots' grids, once in a roll-out, for it has no weights to learn."""
-        if not self._grid:
-            return vector, ()
-        assert depth is not None
-        return cast(NavActor, self.model.actor).plan(as_unit(depth[0]), vector, self._grid, self._fresh)
+    def _plan(self, depth: Tensor | None, vector: Tensor) -> Tensor:
+        """The vector, with what is planned on the robots' grids: once in a roll-out, for it has no weights to learn."""
+        if self._planner is None or depth is None:
+            return vector
+        return self._planner.plan(as_unit(depth[0]), vector, self._fresh)
 
     def _remember(self, state: tuple[Tensor, ...]) -> None:
         for part, now in zip(self._state, state, strict=True):

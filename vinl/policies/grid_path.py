@@ -104,7 +104,8 @@ def spread_distances(
 def _describe(distance: Tensor, middles: Tensor, towards: Tensor, c: Tensor, s: Tensor) -> Tensor:
     n, rows = len(distance), torch.arange(len(distance), device=distance.device)
     flat = distance.flatten(1)
-    offsets = torch.tensor([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)], device=distance.device)
+    nine = torch.arange(9, device=distance.device)
+    offsets = torch.stack([nine // 3 - 1, nine % 3 - 1], 1)  # of a cell and its neighbours
     at = torch.full((n, 2), SIDE // 2, device=distance.device)
     told: list[Tensor] = []
     for k in range(1, AHEAD[-1] + 1):  # downhill, cell by cell

@@ -67,6 +67,7 @@ class OccupancyGrid(nn.Module):
 
     left: Tensor
     down: Tensor
+    held_at: Tensor
 
     def __init__(self, camera: Camera) -> None:
         super().__init__()
@@ -76,6 +77,7 @@ class OccupancyGrid(nn.Module):
         down = (torch.arange(camera.height, device="cpu") + 0.5) / camera.height * 2 - 1
         self.register_buffer("left", -across * tan_x, persistent=False)
         self.register_buffer("down", down * tan_y, persistent=False)
+        self.register_buffer("held_at", torch.tensor(_BUMPS, device="cpu").T.contiguous(), persistent=False)
 
     @staticmethod
     def start(n: int, device: torch.device | str | None = None) -> GridState:
@@ -107,8 +109,8 @@ class OccupancyGrid(nn.Module):
         unknown = (stale[:, 0, :, None] | stale[:, 1, None, :]).flatten(1) | fresh[:, None]
         cells, bumps = (torch.where(unknown, 0.0, part[0]) for part in (state.cells, state.bumps))
         held = (asked > _ASKED) & ((step[:, 0] ** 2 + step[:, 1] ** 2).sqrt() < _CAME) & ~fresh
-        x, y = (torch.tensor([row], device=depth.device) for row in zip(*_BUMPS, strict=True))
-        bumps = torch.maximum(_FADE * bumps, self._mark(after, x, y, held[:, None].expand(-1, len(_BUMPS))))
+        met = self._mark(after, self.held_at[:1], self.held_at[1:], held[:, None].expand(-1, len(_BUMPS)))
+        bumps = torch.maximum(_FADE * bumps, met)
         hit, passed = self._trace(depth.float() * self.far, after)
         moved = torch.where(passed > 0, cells - _PASSED * (cells + 1), cells)
         return GridState(after[None], torch.where(hit > 0, cells + _HIT * (1 - cells), moved)[None], bumps[None])

@@ -1,0 +1,78 @@
+"""The occupancy grids of all robots of a training, and the paths on them, step by step along its roll-outs."""
+
+from __future__ import annotations
+
+import sys
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from vinl.policies.grid_path import Relax, relax
+from vinl.policies.nav_actor import NavActor
+from vinl.policies.occupancy_grid import SIDE
+from vinl.rl.step_graph import StepGraph
+
+
+class RolloutPlanner:
+    """Runs ``NavActor.plan`` for n robots, on a GPU as one CUDA graph.
+
+    Args:
+        actor: whose grid and path it is.
+        compiled: whether the path's loop goes through ``torch.compile`` first (GPU only).
+
+    Attributes:
+        grid: the robots' grids before the present step; stays where it is.
+    """
+
+    def __init__(self, actor: NavActor, robots: int, device: torch.device, compiled: bool) -> None:
+        assert actor.image is not None
+        self._actor = actor
+        self.grid = actor.initial_grid(robots, device)
+        self._next = tuple(torch.zeros_like(part) for part in self.grid)
+        self._depth = torch.zeros(robots, *actor.image, device=device)
+        self._vector = torch.zeros(robots, actor.observation_size, device=device)
+        self._fresh = torch.ones(robots, dtype=torch.bool, device=device)
+        self._planned = torch.zeros(robots, actor.input_size, device=device)
+        self._graph = StepGraph(self._step) if device.type == "cuda" else None
+        self._unused = torch.zeros(1, dtype=torch.long, device=device)
+        if compiled:
+            actor.spread = compile_relax(robots, device)
+
+    def plan(
+        self, depth: Float[Tensor, "n height width"], vector: Float[Tensor, "n k"], fresh: Bool[Tensor, " n"]
+    ) -> Float[Tensor, "n input"]:
+        """See ``NavActor.plan``; good until the next call. The grids stay as they are until ``go_on``."""
+        self._depth.copy_(depth)
+        self._vector.copy_(vector)
+        self._fresh.copy_(fresh)
+        if self._graph is None:
+            self._step(self._unused)
+        else:
+            self._graph.run(self._unused)
+        return self._planned
+
+    def go_on(self) -> None:
+        """The step that was planned is made."""
+        for part, now in zip(self.grid, self._next, strict=True):
+            part.copy_(now)
+
+    def _step(self, unused: Tensor) -> None:
+        planned, grid = self._actor.plan(self._depth, self._vector, self.grid, self._fresh)
+        self._planned.copy_(planned)
+        for part, now in zip(self._next, grid, strict=True):
+            part.copy_(now)
+
+
+def compile_relax(robots: int, device: torch.device) -> Relax:
+    """``relax`` for the grids of so many robots as one kernel a step in place of thirteen, held against itself: what
+    does not compute the same is not used."""
+    random = torch.Generator("cpu").manual_seed(0)
+    distance, cost = (torch.rand(robots, SIDE, SIDE, generator=random).to(device) for _ in range(2))
+    compiled = torch.compile(relax, dynamic=False)
+    with torch.no_grad():
+        difference = float((compiled(30 * distance, cost) - relax(30 * distance, cost)).abs().max())
+    if difference < 1e-4:  # not of NaN
+        return compiled
+    print(f"warning: compiled, paths differ by {difference:g} m; the planner is not, which is slower", file=sys.stderr)
+    return relax
