@@ -129,7 +129,8 @@ class OccupancyGrid(nn.Module):
         ahead = (self.ahead + along)[:, None].expand(-1, len(self.left)).flatten()
         left = (along[:, None] * self.left).flatten()
         passed = self._mark(pose, ahead[None], left[None], free)
-        passed = torch.maximum(passed, self._mark(pose, *(torch.zeros_like(pose[:, :1]),) * 2, free[:, :1] | True))
+        here = torch.zeros_like(pose[:, :1])
+        passed = torch.maximum(passed, self._mark(pose, here, here, torch.ones_like(here, dtype=torch.bool)))
         end = ends + 0.2 * CELL  # in the cell behind the surface, not before it
         return self._mark(pose, self.ahead + end, end * self.left, ends < _SEEN), passed
 
