@@ -56,17 +56,13 @@ class Navigation(OnnxPolicy):
 
     def step(self, pose, goal, depth):
         """From the pose (x, y [m], yaw [rad]) and the goal (x, y) in odometry, and depth [m]."""
-        (x, y), motion, step = goal - pose[:2], np.zeros(2), np.zeros(3)
+        (x, y), step = goal - pose[:2], np.zeros(3)
         bearing = np.arctan2(y, x) - pose[2]
-        if self.before is not None:  # forward speed and yaw rate of the arc that leads from the last pose to this one
-            turn = (pose[2] - self.before[2] + np.pi) % (2 * np.pi) - np.pi
-            heading, (dx, dy) = self.before[2] + turn / 2, pose[:2] - self.before[:2]
-            c, s = np.cos(self.before[2]), np.sin(self.before[2])
-            step = np.array([c * dx + s * dy, c * dy - s * dx, turn])
-            forward = (np.cos(heading) * dx + np.sin(heading) * dy) / np.sinc(turn / 2 / np.pi)
-            motion = np.clip((np.array([forward, turn]) / self.about["period"] - self.middle) / self.half, -1, 1)
+        if self.before is not None:  # forward, left and turned since the last decision, as the robot stood then
+            (dx, dy), turn, heading = pose[:2] - self.before[:2], pose[2] - self.before[2], self.before[2]
+            c, s = np.cos(heading), np.sin(heading)
+            step = np.array([c * dx + s * dy, c * dy - s * dx, (turn + np.pi) % (2 * np.pi) - np.pi])
         self.before = np.array(pose)
         where = {"goal_distance": [np.hypot(x, y)], "goal_direction": [np.cos(bearing), np.sin(bearing)]}
-        known = {**where, "previous_action": self.last, "previous_motion": motion, "previous_step": step}
-        self.last = np.clip(self.act(known, depth), -1, 1)
+        self.last = np.clip(self.act({**where, "previous_action": self.last, "previous_step": step}, depth), -1, 1)
         return np.insert(self.middle + self.half * self.last, 1, 0.0)

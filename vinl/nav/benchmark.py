@@ -196,7 +196,7 @@ def _count_activations(actor: NavActor) -> float:
     fresh = torch.zeros(shape, dtype=torch.bool)
     with torch.autograd.graph.saved_tensors_hooks(keep, give), torch.autocast("cpu", torch.bfloat16):
         feature, _ = actor.look(
-            depth, torch.rand(*shape, actor.observation_size), actor.initial_state(_TRIED_ROBOTS), fresh
+            depth, torch.rand(*shape, actor.input_size), actor.memory.initial_state(_TRIED_ROBOTS), fresh
         )
         feature.sum()
     return sum(kept.values()) / (_TRIED_STEPS * _TRIED_ROBOTS)
