@@ -9,24 +9,8 @@ import torch
 from vinl.config.errors import InputError
 from vinl.nav.config import EpisodeConfig, ExecutionConfig, NavRewardConfig
 from vinl.nav.environment import NavEnvironment
-from vinl.nav.learning_config import NavPpoConfig
-from vinl.policies.places import VIEW
 from vinl.policies.velocity_range import VelocityRange
 from vinl.sensing.sensor_config import OdometryConfig
-
-
-def test_places_are_those_of_the_episode(config, homes):
-    settings = replace(config, num_envs=40, camera=None, ppo=NavPpoConfig(places=0.1), episodes=EpisodeConfig(steps=12))
-    environment = NavEnvironment(settings, homes)
-    begun = environment.find_places().sum(1)
-    assert (begun >= 1).all() and (begun <= 4).all()  # here and nowhere else; an askew view may read a cell twice
-    for _ in range(20):
-        ended = environment.step(torch.tensor([[0.8, 0.2]]).expand(40, 2)).done
-        seen = environment.find_places().reshape(40, VIEW, VIEW)
-        assert (seen[:, VIEW // 2, VIEW // 2] == 1).all() and (seen[ended].sum((1, 2)) <= 4).all()
-    assert seen.sum() > 60
-    with pytest.raises(InputError, match=r"ppo\.places"):
-        NavEnvironment(replace(settings, ppo=NavPpoConfig()), homes).find_places()
 
 
 def test_steps_are_well_formed(config, homes):

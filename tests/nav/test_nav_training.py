@@ -19,7 +19,6 @@ from vinl.nav import training
 from vinl.nav.config import NavConfig
 from vinl.nav.learning_config import NavPpoConfig
 from vinl.nav.recurrent_model import build_actor, load_critic, load_start, save_critic
-from vinl.nav.recurrent_ppo import count_guesses
 from vinl.nav.training import build_algorithm, build_environment, make_card, separate
 from vinl.policies.io import load_policy, save_policy
 from vinl.policies.nav_actor import NavActor
@@ -244,13 +243,6 @@ def test_processes_have_homes_and_chance_of_their_own():
     one = separate(config, 1)
     assert one.seed != config.seed and one.homes.seed - config.homes.seed >= 1_000_000
     assert separate(config, 0) == config
-
-
-def test_the_memory_may_be_taught_places(tmp_path, small):
-    assert train(small, tmp_path / "run", "--iterations", "2", "ppo.places=0.3") == 0
-    assert all(row["loss/guess"] > 0 for row in rows(tmp_path / "run"))
-    assert not any("guess" in name for name in load_policy(tmp_path / "run").network.state_dict())
-    assert (count_guesses(NavPpoConfig(places=0.3)), count_guesses(NavPpoConfig())) == (81, 0)
 
 
 def test_settings_reach_the_algorithm():

@@ -53,10 +53,7 @@ class CueTask:
 
     def observe(self):
         shown = torch.where(self.clock == 0, self.cue, 0.0)
-        observation = {
-            "vector": torch.zeros(self.n, 1) if self.image else shown[:, None],
-            "hidden": self.cue[:, None].expand(-1, 2),
-        }
+        observation = {"vector": torch.zeros(self.n, 1) if self.image else shown[:, None]}
         if self.image:
             observation["depth"] = (0.5 + 0.5 * shown)[:, None, None].expand(-1, 16, 16).half()
         return TensorDict(observation, batch_size=[self.n])
@@ -69,10 +66,10 @@ class CueTask:
         return self.observe(), reward, done, {"time_outs": torch.zeros(self.n)}
 
 
-def build(n=64, image=False, image_type="float16", rate=3e-3, peers=None, hidden=0, **settings):
-    model = RecurrentActorCritic(ToyActor(image), guesses=hidden)
+def build(n=64, image=False, image_type="float16", rate=3e-3, peers=None, **settings):
+    model = RecurrentActorCritic(ToyActor(image))
     state = model.actor.initial_state(n)
-    storage = RecurrentStorage(STEPS, n, model.actor.image, image_type, 1, 1, state, "cpu", hidden)
+    storage = RecurrentStorage(STEPS, n, model.actor.image, image_type, 1, 1, state, "cpu")
     return RecurrentPPO(model, storage, DeviceRate(rate), NavPpoConfig(**settings), peers)
 
 
@@ -103,17 +100,6 @@ def test_it_learns_what_only_memory_solves(image, image_type):
     # without memory the best that three of four steps can have is 0.75, less the spread of the actions
     assert reward > 0.9
     assert losses["kl"] >= 0.0 and losses["gradient_norm"] > 0.0
-
-
-def test_the_feature_learns_to_tell_what_is_hidden_without_any_reward():
-    torch.manual_seed(3)
-    algorithm = build(hidden=2, places=1.0, entropy=0.0, value=0.0)
-    task = CueTask(64, False)
-    task.step = lambda action, step=task.step: (lambda o, r, d, e: (o, 0 * r, d, e))(*step(action))
-    _, first = learn(algorithm, task, 1)
-    _, last = learn(algorithm, task, 60)
-    # the cue is shown in one step of four: a guess without memory leaves three quarters of its variance of 1
-    assert first["guess"] > 0.7 and last["guess"] < 0.2
 
 
 def test_the_update_sees_what_acting_saw():

@@ -17,7 +17,6 @@ from vinl.nav.config import NavConfig
 from vinl.nav.home_store import HomeStore
 from vinl.nav.kernels import Robots, aim_cameras, draw_keys, move_robots, place_robots, render_interior, write_rules
 from vinl.policies.nav_actor import DISTANCE_UNIT
-from vinl.policies.places import blank_places, view_places, visit_places
 from vinl.robot.cameras import Camera
 from vinl.sensing.depth import check_device
 from vinl.sensing.odometry import Odometry
@@ -209,8 +208,6 @@ class NavEnvironment:
             self.state |= {f"odometry_{name}": tensor for name, tensor in self._odometry.state.items()}
         if config.previous == "step":
             self.state["came"] = self._zeros(n, 3)
-        if config.ppo.places > 0:
-            self.state["places"] = blank_places(n, self.device)
         self._key = self._zeros(n, dtype=torch.int32)
         self._rows = torch.arange(n, dtype=torch.int32, device=self.device)
         self._chosen = self._zeros(n, dtype=torch.bool)
@@ -263,16 +260,6 @@ class NavEnvironment:
     def distance(self) -> Float[Tensor, " n"]:
         """Geodesic distance to the goal [m]; what the robots themselves do not know. Changes with the next step."""
         return self.state["distance"]
-
-    def find_places(self) -> Float[Tensor, "n view"]:
-        """Where in the 4 m around them the robots have been lately, see ``view_places``.
-
-        Raises:
-            InputError: ``ppo.places`` is 0: nobody keeps track.
-        """
-        if "places" not in self.state:
-            raise InputError("robots keep track of where they have been if ppo.places is above 0")
-        return view_places(self.state["places"], self.state["position"], self.state["yaw"])
 
     def read_measures(self) -> dict[str, float]:
         """Means over the episodes that ended since the last call (``success``, ``spl``, ``soft_spl``, ``collisions``,
@@ -328,7 +315,6 @@ class NavEnvironment:
             self._odometry.advance(place, state["position"])
         if "came" in state:
             state["came"].copy_(_step_between(believed, self._believe()))
-        self._visit()
         state["steps"] += 1
         state["path"] += self._moved
         state["collisions"] += self._blocked
@@ -380,8 +366,6 @@ class NavEnvironment:
             place_robots, self.num_envs, [self.homes.homes, self._rules, "chance", "chosen", self._robots, "unplaced"]
         )
         self._draw_errors()
-        if "places" in state:
-            self._forget(chosen)
         for name in ("steps", "path", "collisions", "in_a_row"):
             state[name].masked_fill_(chosen, 0.0)
         if "came" in state:
@@ -400,18 +384,6 @@ class NavEnvironment:
             sensor.restart(self._key, self._chosen)
         if self._odometry is not None:
             self._odometry.restart(self._key, self._chosen, self.state["position"])
-
-    def _forget(self, chosen: Tensor) -> None:
-        """Robots whose episodes start have been where they are, and nowhere else."""
-        places = self.state["places"]
-        start = visit_places(torch.zeros_like(places), self.state["position"], chosen)
-        places.copy_(torch.where(chosen[:, None], start, places))
-
-    def _visit(self) -> None:
-        """Note where the robots are, if somebody wants to know."""
-        if "places" in self.state:
-            never = torch.zeros(self.num_envs, dtype=torch.bool, device=self.device)
-            self.state["places"].copy_(visit_places(self.state["places"], self.state["position"], never))
 
     def _look(self, rows: Tensor) -> tuple[Tensor, Tensor]:
         n, state = self.num_envs, self.state

@@ -347,7 +347,6 @@ def describe_episodes(card: PolicyCard | None, rules: NavEvaluation) -> NavConfi
         episodes=episodes,
         homes=homes,
         clutter=replace(config.clutter, share=rules.clutter),
-        ppo=replace(config.ppo, places=0.0),  # a training's loss: nobody asks for it here
         network=replace(config.network, grid=False),  # the policy brings its own
     )
 

@@ -65,9 +65,6 @@ class NavPpoConfig:
         value: weight of the value loss.
         entropy, last_entropy: weight of the entropy bonus at the start and, moving from ``cool_from`` on, at the end;
             null: it stays.
-        places: weight of a further loss: a linear layer on the memory's output is to tell where in the 4 m around it
-            the robot has been lately (``vinl.policies.places``), so that the memory learns to keep places and to know
-            them again. Motion and images hold all that it takes. 0: none.
         max_grad_norm: gradients are clipped to this norm.
         log_std, log_std_range: logarithm of the actions' standard deviation at the start, and its limits.
         last_log_std: from ``cool_from`` on the upper limit moves to this: what is shipped acts without chance, and
@@ -95,7 +92,6 @@ class NavPpoConfig:
     value: float = 0.5
     entropy: float = 0.003
     last_entropy: float | None = None
-    places: float = 0.0
     max_grad_norm: float = 0.5
     log_std: float = -0.5
     log_std_range: tuple[float, float] = (-2.0, 0.2)
@@ -112,7 +108,7 @@ class NavPpoConfig:
             "ppo.",
             counts=("steps", "epochs", "minibatches"),
             positive=("desired_kl", "last_rate", "clip", "max_grad_norm", "gamma"),
-            unsigned=("value", "entropy", "last_entropy", "places", "critic_warmup"),
+            unsigned=("value", "entropy", "last_entropy", "critic_warmup"),
             fractions=("gamma", "lam", "cool_from"),
         )
         if self.image_type not in IMAGE_TYPES:

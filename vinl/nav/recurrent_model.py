@@ -39,24 +39,20 @@ class Outlook(NamedTuple):
         mean: (t, n, a) of the actions.
         value: (t, n).
         state: the memory after the last step.
-        guess: (t, n, g) of what is hidden from the robots; g is 0 where nothing is to be guessed.
     """
 
     mean: Float[Tensor, "t n a"]
     value: Float[Tensor, "t n"]
     state: State
-    guess: Float[Tensor, "t n g"]
 
 
 class RecurrentActorCritic(nn.Module):
-    """Shared trunk and heads: the actor's mean, the value, and guesses at what is hidden. The actions' spread does not
-    depend on the state.
+    """Shared trunk and two heads: the actor's mean and the value. The actions' spread does not depend on the state.
 
     Args:
         actor: a ``MemoryActor``.
         log_std: logarithm of the actions' standard deviation at the start.
         log_std_range: it is held within these.
-        guesses: hidden numbers that the feature is to tell.
     """
 
     _log_std_range: Tensor
@@ -66,7 +62,6 @@ class RecurrentActorCritic(nn.Module):
         actor: PolicyNetwork,
         log_std: float = -0.5,
         log_std_range: tuple[float, float] = (-2.0, 0.2),
-        guesses: int = 0,
     ) -> None:
         super().__init__()
         self.actor = actor
@@ -75,7 +70,6 @@ class RecurrentActorCritic(nn.Module):
         width = cast(MemoryActor, actor).feature_size
         value = nn.Linear(width, 1)
         self.value = nn.Sequential(value)
-        self.guess = nn.Linear(width, guesses) if guesses else None
         nn.init.orthogonal_(value.weight)
         nn.init.zeros_(value.bias)
 
@@ -88,8 +82,7 @@ class RecurrentActorCritic(nn.Module):
         feature, state = actor.look(images, vector, state, fresh)
         feature = feature.float()
         with torch.autocast(feature.device.type, enabled=False):
-            guess = feature[..., :0] if self.guess is None else self.guess(feature)
-            return Outlook(actor.choose(feature), self.value(feature)[..., 0], state, guess)
+            return Outlook(actor.choose(feature), self.value(feature)[..., 0], state)
 
     def actor_parameters(self) -> list[nn.Parameter]:
         """Those of the actor, the part shared with the critic included, and of its spread."""
@@ -130,7 +123,6 @@ class Minibatch(NamedTuple):
     values: Tensor
     advantages: Tensor
     returns: Tensor
-    hidden: Tensor | None
 
 
 class RecurrentStorage:
@@ -139,7 +131,7 @@ class RecurrentStorage:
     Args:
         image: (height, width) of the images, or None.
         image_type: one of ``config.IMAGE_TYPES``.
-        vector, actions, hidden: sizes; ``hidden`` 0: there is none.
+        vector, actions: sizes.
         state: of the robots at the start; its shapes are taken.
     """
 
@@ -153,7 +145,6 @@ class RecurrentStorage:
         actions: int,
         state: State,
         device: torch.device | str,
-        hidden: int = 0,
     ) -> None:
         def room(*size: int, dtype: torch.dtype = torch.float32) -> Tensor:
             return torch.zeros(steps, robots, *size, dtype=dtype, device=device)
@@ -161,7 +152,6 @@ class RecurrentStorage:
         self.steps, self.robots = steps, robots
         self.depth = room(*image, dtype=getattr(torch, image_type)) if image else None
         self.vector, self.actions, self.means = room(vector), room(actions), room(actions)
-        self.hidden = room(hidden) if hidden else None
         self.fresh, self.done = room(dtype=torch.bool), room(dtype=torch.bool)
         self.log_prob, self.values, self.rewards = room(), room(), room()
         self.advantages, self.returns = room(), room()

@@ -22,20 +22,19 @@ from vinl.nav.learning_config import NavPpoConfig
 from vinl.nav.recurrent_model import Outlook, RecurrentActorCritic, RecurrentStorage, as_unit
 from vinl.nav.rollout_planner import RolloutPlanner
 from vinl.policies.nav_actor import NavActor
-from vinl.policies.places import VIEW
 from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers
 
 _LOG_2PI = math.log(2.0 * math.pi)
-_SUMS = ("surrogate", "value", "entropy", "guess", "kl", "clipped", "gradient_norm")
+_SUMS = ("surrogate", "value", "entropy", "kl", "clipped", "gradient_norm")
 """What is added up on the device over an update."""
 
 
 class RecurrentPPO:
     """Learns from roll-outs of a ``RecurrentActorCritic``.
 
-    Observations are a ``TensorDict`` with ``vector`` (n, k), ``depth`` (n, H, W) in [0, 1] unless the actor is blind,
-    and ``hidden`` (n, g) if the feature is to tell it.
+    Observations are a ``TensorDict`` with ``vector`` (n, k), and ``depth`` (n, H, W) in [0, 1] unless the actor is
+    blind.
 
     Args:
         config: of the algorithm; the learning rate is ``rate``'s.
@@ -191,8 +190,6 @@ class RecurrentPPO:
     def _keep(self, observation: TensorDict, t: int) -> Tensor | None:
         """Store the observation of step t; returns its images (1, n, height, width)."""
         st = self.storage
-        if st.hidden is not None:
-            st.hidden[t] = observation["hidden"]
         depth: Tensor | None = None
         if st.depth is not None:
             st.depth[t] = st.as_stored(observation["depth"])
@@ -223,7 +220,7 @@ class RecurrentPPO:
         """One step of the optimiser on all steps of some robots."""
         s, st, model = self.config, self.storage, self.model
         batch = st.take(robots)
-        mean, value, _, guess = self._look(batch.depth, batch.vector, batch.state, batch.fresh)
+        mean, value, _ = self._look(batch.depth, batch.vector, batch.state, batch.fresh)
         log_std = model.log_std
         log_ratio = _log_prob(batch.actions, mean, log_std) - batch.log_prob
         ratio = log_ratio.exp()
@@ -232,10 +229,7 @@ class RecurrentPPO:
         near = batch.values + (value - batch.values).clamp(-s.clip, s.clip)
         value_loss = torch.max((value - batch.returns).square(), (near - batch.returns).square()).mean()
         entropy = (log_std + 0.5 * (1.0 + _LOG_2PI)).sum()
-        guess_loss = torch.zeros_like(entropy)
-        if batch.hidden is not None:
-            guess_loss = ((guess - batch.hidden).square() * (s.places / guess.shape[-1])).sum(-1).mean()
-        loss = surrogate + s.value * value_loss - self.entropy * entropy + guess_loss
+        loss = surrogate + s.value * value_loss - self.entropy * entropy
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         if not self._actor_learns:  # Adam leaves a weight alone whose gradient has always been zero
@@ -250,12 +244,7 @@ class RecurrentPPO:
             kl = _divergence(batch.means, st.log_std, mean, log_std).mean()
             clipped = (bounded != ratio).float().mean()
             self._kl += kl
-            self._sums += torch.stack([surrogate, value_loss, entropy, guess_loss, kl, clipped, norm])
-
-
-def count_guesses(config: NavPpoConfig) -> int:
-    """Hidden numbers that the feature is to tell: where the robot has been, if that has a weight."""
-    return VIEW**2 if config.places > 0 else 0
+            self._sums += torch.stack([surrogate, value_loss, entropy, kl, clipped, norm])
 
 
 def build_storage(config: NavConfig, actor: NavActor, device: torch.device | str) -> RecurrentStorage:
@@ -269,7 +258,6 @@ def build_storage(config: NavConfig, actor: NavActor, device: torch.device | str
         actor.action_size,
         actor.memory.initial_state(config.num_envs, device),
         device,
-        hidden=count_guesses(config.ppo),
     )
 
 

@@ -19,7 +19,7 @@ from vinl.nav.config import NavConfig
 from vinl.nav.environment import NavEnvironment
 from vinl.nav.home_store import HomeStore
 from vinl.nav.recurrent_model import RecurrentActorCritic, build_actor, load_critic, load_start, save_critic
-from vinl.nav.recurrent_ppo import RecurrentPPO, build_storage, count_guesses
+from vinl.nav.recurrent_ppo import RecurrentPPO, build_storage
 from vinl.policies.card import PolicyCard, navigation_card
 from vinl.policies.io import save_policy
 from vinl.policies.lineage import find_commit, trace_lineage
@@ -41,14 +41,10 @@ _RATE_DOWN, _RATE_UP = 1.5, 1.1
 
 
 class NavTrainingEnv:
-    """Actions go in held to their range, observations come out as rsl-rl has them.
+    """Actions go in held to their range, observations come out as rsl-rl has them."""
 
-    Args:
-        places: whether observations hold where the robot has been lately, for the network to guess.
-    """
-
-    def __init__(self, environment: NavEnvironment, places: bool = False) -> None:
-        self.environment, self._places = environment, places
+    def __init__(self, environment: NavEnvironment) -> None:
+        self.environment = environment
         self.num_envs = environment.num_envs
 
     def get_observations(self) -> TensorDict:
@@ -77,8 +73,6 @@ class NavTrainingEnv:
         seen = {"vector": vector}
         if self.environment.camera is not None:
             seen["depth"] = depth
-        if self._places:
-            seen["hidden"] = self.environment.find_places()
         return TensorDict(seen, batch_size=[len(vector)])
 
 
@@ -171,7 +165,7 @@ def train_navigator(
 
     loop = PeerLoop(
         peers,
-        NavTrainingEnv(environment, config.ppo.places > 0),
+        NavTrainingEnv(environment),
         algorithm,
         config.ppo.steps,
         peer_folder(run, peers),
@@ -256,7 +250,7 @@ def build_algorithm(
     actor = build_actor(config)
     if weights is not None:
         actor.load_state_dict(weights)
-    model = RecurrentActorCritic(actor, p.log_std, p.log_std_range, guesses=count_guesses(p)).to(device)
+    model = RecurrentActorCritic(actor, p.log_std, p.log_std_range).to(device)
     rate = DeviceRate(p.learning_rate, *p.rate_limits(0.0), p.desired_kl, _RATE_DOWN, _RATE_UP, device)
     return RecurrentPPO(model, build_storage(config, actor, device), rate, p, peers)
 
