@@ -124,6 +124,14 @@ def test_the_path_leads_around_a_wall_and_says_how_much_longer_it_is() -> None:
     assert 5 * told[-1] == pytest.approx(10 * told[-2] - 5, abs=1e-4)
 
 
+def test_no_path_slips_through_an_oblique_wall() -> None:
+    state = drawn([])
+    for k in range(-20, 21):  # a diagonal of cells that touch by their corners alone
+        state.cells[0, 0, index_of(torch.tensor([2.0 + k * CELL + 0.01, k * CELL + 0.01]))] = 1.0
+    told = plan_path(state, torch.tensor([[4.0, 0.0]]))[0].numpy()
+    assert 10 * told[-2] > 6.5  # around one of its ends, 3 m aside
+
+
 def test_a_dead_end_is_left_although_the_goal_lies_behind_its_end() -> None:
     room = [(-1.5, 1.0, 3.0, 1.5), (-1.5, -1.5, 3.0, -1.0), (2.5, -1.5, 3.0, 1.5)]
     told = plan_path(drawn(room), torch.tensor([[5.0, 0.0]]))[0].numpy()

@@ -12,22 +12,22 @@ from torch import Tensor
 
 from vinl.policies.occupancy_grid import CELL, PASSABLE, SIDE, GridState, cell_of
 
-AHEAD = (3, 6, 12)
-"""The path is told at so many cells from the robot: 0.75 to 4 m."""
+AHEAD = (5, 10, 20)
+"""The path is told at so many cells from the robot: 0.75 to 3 m, more where it is oblique."""
 
 PLAN_SIZE = 2 * len(AHEAD) + 2
 """Numbers that ``plan_path`` gives."""
 
-ROUNDS, STEPS = 10, 8
-"""Distances spread by one cell in each step: paths of up to 80 cells, 20 m, within the
-grid. In homes in training they no longer change near the robot after 48 (median) to 72 steps."""
+ROUNDS, STEPS = 16, 8
+"""Distances spread by one cell in each step: paths of up to 128 cells, 19 m, within the grid."""
 
 _OCCUPIED, _FREE = 0.2, -0.1
 """Cells above the one are taken for occupied, below the other for free."""
 
-_NEAR, _AROUND, _UNSURE, _THROUGH = 2.0, 0.5, 6.0, 20.0
+_NEAR, _AROUND, _UNSURE, _THROUGH = 2.0, 0.5, 12.0, 100.0
 """What a metre costs, beyond its length: beside an occupied cell; one cell farther away; beside one and not known to be
-free, which is how walls look that were seen in part; and through it, for no grid is so sure that there is no path."""
+free, which is how walls look that were seen in part; and through one that is occupied for sure, for no grid is so sure
+that there is no path."""
 
 _FAR = 1e3
 """Before anything is known of a cell's distance [m]."""
@@ -86,10 +86,11 @@ def spread_distances(
         cells: see ``GridState``, the robot's in the middle.
         straight: distance of each cell to the goal [m].
     """
-    solid = (cells > _OCCUPIED).float()
+    wall = close_corners(((cells - _OCCUPIED) / (1 - _OCCUPIED)).clamp(min=0))
+    solid = (wall > 0).float()
     near, around = F.max_pool2d(solid, 3, 1, 1), F.max_pool2d(solid, 5, 1, 2)
     unsure = near * (cells > _FREE)
-    cost = CELL * (1 + (_NEAR - _AROUND) * near + _AROUND * around + _UNSURE * unsure + _THROUGH * solid)
+    cost = CELL * (1 + (_NEAR - _AROUND) * near + _AROUND * around + _UNSURE * unsure + _THROUGH * wall)
     edge = torch.ones_like(solid[:1])
     edge[:, 1:-1, 1:-1] = 0.0
     distance = torch.where((edge > 0) | (straight < 0.75 * CELL), straight, _FAR)
@@ -99,6 +100,15 @@ def spread_distances(
         if watched and torch.equal(before, distance):  # elsewhere to look would be to wait
             break
     return distance
+
+
+def close_corners(wall: Float[Tensor, "n side side"]) -> Float[Tensor, "n side side"]:
+    """Cells that have a wall both above or below and to the left or right become as much of one as these: an oblique
+    wall is a flight of stairs on the grid, and a path would slip through between two steps."""
+    w = F.pad(wall, (1, 1, 1, 1))
+    over = torch.maximum(w[:, :-2, 1:-1], w[:, 2:, 1:-1])
+    beside = torch.maximum(w[:, 1:-1, :-2], w[:, 1:-1, 2:])
+    return torch.maximum(wall, torch.minimum(over, beside))
 
 
 def _describe(distance: Tensor, middles: Tensor, towards: Tensor, c: Tensor, s: Tensor) -> Tensor:

@@ -10,11 +10,12 @@ from torch import Tensor, nn
 
 from vinl.robot.cameras import Camera
 
-CELL = 0.25
-"""Side of a cell [m]: the narrowest door, 0.6 m, leaves at least one free."""
+CELL = 0.15
+"""Side of a cell [m]: of the narrowest door, 0.6 m, at least one stays free however the grid lies. With 0.25 m one
+door in twenty is closed."""
 
-SIDE = 64
-"""Cells along each side: 16 m. Cells that the robot leaves behind are used again for those ahead."""
+SIDE = 96
+"""Cells along each side: 14.4 m. Cells that the robot leaves behind are used again for those ahead."""
 
 MOUNT_HEIGHT = 0.43
 """Height of the camera over the floor [m] [recorded: 0.424 to 0.439]."""
@@ -37,7 +38,7 @@ _ASKED, _CAME = 0.3, 0.06
 """A robot that asked for more than this fraction of its full speed, and came no farther than this [m], has met
 something that it does not see: ..."""
 
-_BUMPS = ((0.45, -0.12), (0.45, 0.12))
+_BUMPS = tuple((0.45, y) for y in (-0.24, -0.12, 0.0, 0.12, 0.24))
 """... these places of its heading frame [m] are occupied, whatever rays pass them, ..."""
 
 _FADE, PASSABLE = 0.98, 0.5
