@@ -19,13 +19,13 @@ class RolloutPlanner:
 
     Args:
         actor: whose grid and path it is.
-        compiled: whether the path's loop goes through ``torch.compile`` first (GPU only).
+        fast: whether the path's loop is one kernel (GPU only).
 
     Attributes:
         grid: the robots' grids before the present step; stays where it is.
     """
 
-    def __init__(self, actor: NavActor, robots: int, device: torch.device, compiled: bool) -> None:
+    def __init__(self, actor: NavActor, robots: int, device: torch.device, fast: bool) -> None:
         assert actor.image is not None
         self._actor = actor
         self.grid = actor.initial_grid(robots, device)
@@ -36,8 +36,8 @@ class RolloutPlanner:
         self._planned = torch.zeros(robots, actor.input_size, device=device)
         self._graph = StepGraph(self._step) if device.type == "cuda" else None
         self._unused = torch.zeros(1, dtype=torch.long, device=device)
-        if compiled:
-            actor.spread = compile_relax(robots, device)
+        if fast:
+            actor.spread = fast_relax(robots, device)
 
     def plan(
         self, depth: Float[Tensor, "n height width"], vector: Float[Tensor, "n k"], fresh: Bool[Tensor, " n"]
@@ -64,15 +64,18 @@ class RolloutPlanner:
             part.copy_(now)
 
 
-def compile_relax(robots: int, device: torch.device) -> Relax:
-    """``relax`` for the grids of so many robots as one kernel a step in place of thirteen, held against itself: what
-    does not compute the same is not used."""
+def fast_relax(robots: int, device: torch.device) -> Relax:
+    """``relax`` for the grids of so many robots as one kernel, held against itself: what does not compute the same is
+    not used."""
+    try:
+        from vinl.nav.grid_kernel import relax_in_blocks
+    except ImportError as error:
+        print(f"warning: no Triton ({error}); grids are planned on four times slower", file=sys.stderr)
+        return relax
     random = torch.Generator("cpu").manual_seed(0)
     distance, cost = (torch.rand(robots, SIDE, SIDE, generator=random).to(device) for _ in range(2))
-    compiled = torch.compile(relax, dynamic=False)
-    with torch.no_grad():
-        difference = float((compiled(30 * distance, cost) - relax(30 * distance, cost)).abs().max())
+    difference = float((relax_in_blocks(30 * distance, cost) - relax(30 * distance, cost)).abs().max())
     if difference < 1e-4:  # not of NaN
-        return compiled
-    print(f"warning: compiled, paths differ by {difference:g} m; the planner is not, which is slower", file=sys.stderr)
+        return relax_in_blocks
+    print(f"warning: paths of the kernel differ by {difference:g} m; it is not used, which is slower", file=sys.stderr)
     return relax

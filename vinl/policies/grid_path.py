@@ -32,7 +32,7 @@ that there is no path."""
 _AT_A_TIME = 16
 """Grids that are planned on at once on a CPU: they fit its cache."""
 
-_FAR = 1e3
+FAR = 1e3
 """Before anything is known of a cell's distance [m]."""
 
 Relax = Callable[[Tensor, Tensor], Tensor]
@@ -42,7 +42,7 @@ def relax(distance: Float[Tensor, "n side side"], cost: Float[Tensor, "n side si
     """Distances after ``STEPS`` steps to the eight neighbours, whose cells are crossed at this cost [m]."""
     diagonal = cost * 2.0**0.5
     for _ in range(STEPS):
-        d = F.pad(distance, (1, 1, 1, 1), value=_FAR)
+        d = F.pad(distance, (1, 1, 1, 1), value=FAR)
         up, down, middle = d[:, :-2], d[:, 2:], d[:, 1:-1]
         beside = torch.minimum(middle[..., :-2], middle[..., 2:])
         straight = torch.minimum(torch.minimum(up[..., 1:-1], down[..., 1:-1]), beside)
@@ -100,7 +100,7 @@ def spread_distances(
     cost = CELL * (1 + (_NEAR - _AROUND) * near + _AROUND * around + _UNSURE * unsure + _THROUGH * wall)
     edge = torch.ones_like(solid[:1])
     edge[:, 1:-1, 1:-1] = 0.0
-    distance = torch.where((edge > 0) | (straight < 0.75 * CELL), straight, _FAR)
+    distance = torch.where((edge > 0) | (straight < 0.75 * CELL), straight, FAR)
     for _ in range(ROUNDS):
         before, distance = distance, spread(distance, cost)
         if watched and torch.equal(before, distance):  # elsewhere to look would be to wait
