@@ -10,7 +10,7 @@ import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor
 
-from vinl.policies.occupancy_grid import CELL, PASSABLE, SIDE, GridState, cell_of
+from vinl.policies.occupancy_grid import CELL, OCCUPIED, SIDE, GridState, cell_of, known_cells
 
 AHEAD = (5, 10, 20)
 """The path is told at so many cells from the robot: 0.75 to 3 m, more where it is oblique."""
@@ -21,8 +21,11 @@ PLAN_SIZE = 2 * len(AHEAD) + 2
 ROUNDS, STEPS = 16, 8
 """Distances spread by one cell in each step: paths of up to 128 cells, 19 m, within the grid."""
 
-_OCCUPIED, _FREE = 0.2, -0.1
-"""Cells above the one are taken for occupied, below the other for free."""
+_FREE = -0.1
+"""Cells below this are taken for free."""
+
+_OUTSIDE = 20.0
+"""How much longer than straight a way through what is not on the grid is taken to be, if the goal is on it [m]."""
 
 _NEAR, _AROUND, _UNSURE, _THROUGH = 2.0, 0.5, 12.0, 100.0
 """What a metre costs, beyond its length: beside an occupied cell; one cell farther away; beside one and not known to be
@@ -71,8 +74,7 @@ def plan_path(state: GridState, goal: Float[Tensor, "n 2"], spread: Relax = rela
     around = torch.arange(SIDE, device=pose.device) - SIDE // 2
     column, row = ((here[:, k, None] + around).remainder(SIDE) for k in (0, 1))
     index = (column[:, :, None] * SIDE + row[:, None, :]).flatten(1)
-    known = torch.where(state.bumps[0] > PASSABLE, 1.0, state.cells[0])
-    cells = known.gather(1, index).reshape(n, SIDE, SIDE)  # the robot's is in the middle
+    cells = known_cells(state).gather(1, index).reshape(n, SIDE, SIDE)  # the robot's is in the middle
     middles = (here[..., None] + around + 0.5) * CELL - pose[:, :2, None]  # (n, 2, SIDE) from the robot
     x, y = middles[:, 0, :, None] - towards[:, :1, None], middles[:, 1, None, :] - towards[:, 1:, None]
     straight = (x * x + y * y).sqrt()
@@ -93,14 +95,16 @@ def spread_distances(
     if watched and len(cells) > _AT_A_TIME:
         parts = zip(cells.split(_AT_A_TIME), straight.split(_AT_A_TIME), strict=True)
         return torch.cat([spread_distances(*part, spread) for part in parts])
-    wall = close_corners(((cells - _OCCUPIED) / (1 - _OCCUPIED)).clamp(min=0))
+    wall = close_corners(((cells - OCCUPIED) / (1 - OCCUPIED)).clamp(min=0))
     solid = (wall > 0).float()
     near, around = F.max_pool2d(solid, 3, 1, 1), F.max_pool2d(solid, 5, 1, 2)
     unsure = near * (cells > _FREE)
     cost = CELL * (1 + (_NEAR - _AROUND) * near + _AROUND * around + _UNSURE * unsure + _THROUGH * wall)
     edge = torch.ones_like(solid[:1])
     edge[:, 1:-1, 1:-1] = 0.0
-    distance = torch.where((edge > 0) | (straight < 0.75 * CELL), straight, FAR)
+    at_goal = straight < 0.75 * CELL
+    beyond = straight + _OUTSIDE * at_goal.flatten(1).any(1)[:, None, None]
+    distance = torch.where(at_goal, straight, torch.where(edge > 0, beyond, FAR))
     for _ in range(ROUNDS):
         before, distance = distance, spread(distance, cost)
         if watched and torch.equal(before, distance):  # elsewhere to look would be to wait

@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from vinl.config.loader import build_config
 from vinl.policies.depth_memory import DepthMemory, State
 from vinl.policies.grid_path import PLAN_SIZE, Relax, plan_path, relax
+from vinl.policies.grid_ranges import DIRECTIONS, measure_ranges
 from vinl.policies.networks import PolicyNetwork
 from vinl.policies.occupancy_grid import GridState, OccupancyGrid
 from vinl.robot.cameras import Camera
@@ -78,13 +79,13 @@ class NavActor(PolicyNetwork):
         self.keep_arguments(locals())
         self.grid = None if grid is None else OccupancyGrid(build_config(Camera, grid))
         self.spread: Relax = relax
-        self.input_size = self.observation_size + (PLAN_SIZE if self.grid else 0)
-        previous += PLAN_SIZE if self.grid else 0
+        told = PLAN_SIZE + DIRECTIONS if self.grid else 0
+        self.input_size = self.observation_size + told
         self.goal = nn.Linear(GOAL_SIZE, embedding)
         self.previous = nn.Linear(previous, embedding)
-        self.memory = DepthMemory(
-            vision, height, width, 2 * embedding, visual, hidden, layers, memory, planes, channels
-        )
+        self.told = nn.Linear(told, 2 * embedding) if told else None
+        vector = (4 if told else 2) * embedding
+        self.memory = DepthMemory(vision, height, width, vector, visual, hidden, layers, memory, planes, channels)
         self.image, self.feature_size = self.memory.image, hidden
         self.mean = nn.Linear(hidden, ACTION_SIZE)
         nn.init.orthogonal_(self.mean.weight, _MEAN_GAIN)
@@ -147,7 +148,7 @@ class NavActor(PolicyNetwork):
         asked = (vector[:, GOAL_SIZE] + 1) / 2  # the action before the step
         now = self.grid.see(GridState(*grid), depth, asked, vector[:, -STEP_SIZE:], fresh)
         goal = vector[:, 1:GOAL_SIZE] * (vector[:, :1] * DISTANCE_UNIT)
-        return torch.cat([vector, plan_path(now, goal, self.spread)], 1), tuple(now)
+        return torch.cat([vector, plan_path(now, goal, self.spread), measure_ranges(now)], 1), tuple(now)
 
     def look(
         self,
@@ -158,7 +159,10 @@ class NavActor(PolicyNetwork):
     ) -> tuple[Float[Tensor, "t n hidden"], State]:
         """Features of t steps in a row, arguments as for ``forward``; the vector is ``plan``'s if there is a grid, and
         the state is the network's alone. A critic may share the features."""
-        parts = [self.goal(vector[..., :GOAL_SIZE]), self.previous(vector[..., GOAL_SIZE:])]
+        seen = vector[..., : self.observation_size]
+        parts = [self.goal(seen[..., :GOAL_SIZE]), self.previous(seen[..., GOAL_SIZE:])]
+        if self.told is not None:
+            parts.append(self.told(vector[..., self.observation_size :]))
         return self.memory(depth, torch.cat(parts, -1), state, fresh)
 
     def choose(self, feature: Float[Tensor, "t n hidden"]) -> Float[Tensor, "t n 2"]:

@@ -45,6 +45,10 @@ _FADE, PASSABLE = 0.98, 0.5
 """... until this factor at every step has brought it below the other, after 34 steps: then it may try again."""
 
 
+OCCUPIED = 0.2
+"""Cells above this are taken for occupied."""
+
+
 class GridState(NamedTuple):
     """The grids of n robots.
 
@@ -104,7 +108,7 @@ class OccupancyGrid(nn.Module):
             fresh: an episode begins: nothing is known.
         """
         before = torch.where(fresh[:, None], 0.0, state.pose[0])
-        x, y = _turned(before[:, 2:], step[:, :1], step[:, 1:2])
+        x, y = turned(before[:, 2:], step[:, :1], step[:, 1:2])
         after = torch.where(fresh[:, None], 0.0, before + torch.cat([x, y, step[:, 2:]], 1))
         stale = _place(cell_of(before)) != _place(cell_of(after))  # (n, 2, SIDE) stand for other ground now
         unknown = (stale[:, 0, :, None] | stale[:, 1, None, :]).flatten(1) | fresh[:, None]
@@ -143,11 +147,16 @@ class OccupancyGrid(nn.Module):
         chosen: Bool[Tensor, "n k"],
     ) -> Float[Tensor, "n cells"]:
         """1 in the cells of the points of the heading frame that are chosen and lie on the grid."""
-        x, y = _turned(pose[:, 2:], ahead, left)
+        x, y = turned(pose[:, 2:], ahead, left)
         limit = (SIDE // 2 - 1) * CELL
         chosen = chosen & (x.abs() < limit) & (y.abs() < limit)
         index = index_of(torch.stack([x, y], -1) + pose[:, None, :2])
         return torch.zeros(len(pose), SIDE**2, device=pose.device).scatter_reduce(1, index, chosen.float(), "amax")
+
+
+def known_cells(state: GridState) -> Float[Tensor, "n cells"]:
+    """What the cells hold, by what was seen and what was met."""
+    return torch.where(state.bumps[0] > PASSABLE, 1.0, state.cells[0])
 
 
 def cell_of(place: Float[Tensor, "*n k"]) -> Int[Tensor, "*n 2"]:
@@ -161,7 +170,8 @@ def index_of(place: Float[Tensor, "*n 2"]) -> Int[Tensor, "*n"]:
     return column * SIDE + row
 
 
-def _turned(angle: Float[Tensor, "n 1"], x: Float[Tensor, "*n k"], y: Float[Tensor, "*n k"]) -> tuple[Tensor, Tensor]:
+def turned(angle: Float[Tensor, "n 1"], x: Float[Tensor, "*n k"], y: Float[Tensor, "*n k"]) -> tuple[Tensor, Tensor]:
+    """Points of the heading frame in the grid's axes."""
     c, s = torch.cos(angle), torch.sin(angle)
     return c * x - s * y, s * x + c * y
 
