@@ -1,5 +1,5 @@
-"""``relax`` as one Triton kernel: a block of threads for each grid, which stays in its cache for all steps. On an H200
-eight steps of 4,096 grids take 0.6 ms; compiled by torch, which reads all grids anew for each step, 2.5 ms."""
+"""``spread`` as one Triton kernel: a block of threads for each grid sweeps over its rows and columns, to and fro, until
+no distance becomes shorter [Zhao 2005]. Seven pairs of sweeps do what takes a hundred steps of all cells at once."""
 
 # pyright: reportMissingImports=false, reportUnknownMemberType=false
 from __future__ import annotations
@@ -10,56 +10,65 @@ import triton.language as tl
 from jaxtyping import Float
 from torch import Tensor
 
-from vinl.policies.grid_path import FAR, STEPS
+from vinl.policies.grid_path import FAR
 
-_WARPS = 32
-"""Of a block: with fewer, more grids share a processor than its cache holds."""
+_ROUNDS = 40
+"""So many times over rows and columns at most; mazes of homes take five."""
 
 
 @triton.jit
-def _relax(given, cost, buffers, size, SIDE: tl.constexpr, STEPS: tl.constexpr, BLOCK: tl.constexpr, FAR: tl.constexpr):
-    grid = tl.program_id(0) * SIDE * SIDE
-    source = given + grid
-    for step in range(STEPS):
-        target = buffers + (step % 2) * size + grid
-        for start in range(0, SIDE * SIDE, BLOCK):
-            at = start + tl.arange(0, BLOCK)
-            row, column = at // SIDE, at % SIDE
-            inside = at < SIDE * SIDE
-            up, down = inside & (row > 0), inside & (row < SIDE - 1)
-            left, right = inside & (column > 0), inside & (column < SIDE - 1)
-            here = source + at
-            straight = tl.minimum(
-                tl.minimum(tl.load(here - SIDE, up, FAR), tl.load(here + SIDE, down, FAR)),
-                tl.minimum(tl.load(here - 1, left, FAR), tl.load(here + 1, right, FAR)),
-            )
-            oblique = tl.minimum(
-                tl.minimum(tl.load(here - SIDE - 1, up & left, FAR), tl.load(here - SIDE + 1, up & right, FAR)),
-                tl.minimum(tl.load(here + SIDE - 1, down & left, FAR), tl.load(here + SIDE + 1, down & right, FAR)),
-            )
-            crossed = tl.load(cost + grid + at, inside, 0.0)
-            better = tl.minimum(straight + crossed, oblique + crossed * 1.4142135623730951)
-            tl.store(target + at, tl.minimum(tl.load(here, inside, FAR), better), inside)
-        tl.debug_barrier()  # the next step reads what other threads of the block wrote
-        source = target
+def _sweep(
+    distance,
+    cost,
+    ACROSS: tl.constexpr,
+    ALONG: tl.constexpr,
+    FORWARD: tl.constexpr,
+    SIDE: tl.constexpr,
+    LANES: tl.constexpr,
+    FAR: tl.constexpr,
+):
+    lane = tl.arange(0, LANES)
+    inside = lane < SIDE
+    shorter = tl.zeros([LANES], tl.float32)
+    for k in range(1, SIDE):
+        here = (k if FORWARD else SIDE - 1 - k) * ACROSS + lane * ALONG
+        behind = here - ACROSS if FORWARD else here + ACROSS
+        straight = tl.load(distance + behind, inside, FAR)
+        left = tl.load(distance + behind - ALONG, inside & (lane > 0), FAR)
+        right = tl.load(distance + behind + ALONG, lane < SIDE - 1, FAR)
+        crossed = tl.load(cost + here, inside, 0.0)
+        before = tl.load(distance + here, inside, FAR)
+        oblique = tl.minimum(left, right) + crossed * 1.4142135623730951
+        after = tl.minimum(before, tl.minimum(straight + crossed, oblique))
+        tl.store(distance + here, after, inside)
+        shorter = tl.maximum(shorter, before - after)
+        tl.debug_barrier()  # the next line reads what other threads of the block wrote
+    return shorter
 
 
-def relax_in_blocks(
+@triton.jit
+def _spread(distance, cost, SIDE: tl.constexpr, LANES: tl.constexpr, ROUNDS: tl.constexpr, FAR: tl.constexpr):
+    distance += tl.program_id(0) * SIDE * SIDE
+    cost += tl.program_id(0) * SIDE * SIDE
+    rounds = 0
+    going = True
+    while going:
+        down = _sweep(distance, cost, SIDE, 1, True, SIDE, LANES, FAR)
+        up = _sweep(distance, cost, SIDE, 1, False, SIDE, LANES, FAR)
+        right = _sweep(distance, cost, 1, SIDE, True, SIDE, LANES, FAR)
+        left = _sweep(distance, cost, 1, SIDE, False, SIDE, LANES, FAR)
+        shorter = tl.maximum(tl.maximum(down, up), tl.maximum(right, left))
+        rounds += 1
+        going = (tl.max(shorter) > 0) & (rounds < ROUNDS)
+
+
+def spread_in_blocks(
     distance: Float[Tensor, "n side side"], cost: Float[Tensor, "n side side"]
 ) -> Float[Tensor, "n side side"]:
-    """See ``vinl.policies.grid_path.relax``; on a GPU only."""
-    n, side = len(distance), distance.shape[-1]
-    buffers = torch.empty(2, *distance.shape, device=distance.device)
-    _relax[(n,)](  # pyright: ignore[reportIndexIssue]
-        distance.contiguous(),
-        cost.contiguous(),
-        buffers,
-        distance.numel(),
-        SIDE=side,
-        STEPS=STEPS,
-        BLOCK=1024,
-        FAR=FAR,
-        num_warps=_WARPS,
-        num_stages=1,
+    """See ``vinl.policies.grid_path.spread``, which stops at paths of 19 m; on a GPU only."""
+    distance, side = distance.clone(memory_format=torch.contiguous_format), distance.shape[-1]
+    lanes = triton.next_power_of_2(side)
+    _spread[(len(distance),)](  # pyright: ignore[reportIndexIssue]
+        distance, cost.contiguous(), SIDE=side, LANES=lanes, ROUNDS=_ROUNDS, FAR=FAR, num_warps=lanes // 32
     )
-    return buffers[(STEPS - 1) % 2]
+    return distance

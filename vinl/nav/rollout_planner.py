@@ -8,9 +8,9 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from vinl.policies.grid_path import Relax, relax
+from vinl.policies.grid_path import FAR, Spread, spread
 from vinl.policies.nav_actor import NavActor
-from vinl.policies.occupancy_grid import SIDE
+from vinl.policies.occupancy_grid import CELL, SIDE
 from vinl.rl.step_graph import StepGraph
 
 
@@ -37,7 +37,7 @@ class RolloutPlanner:
         self._graph = StepGraph(self._step) if device.type == "cuda" else None
         self._unused = torch.zeros(1, dtype=torch.long, device=device)
         if fast:
-            actor.spread = fast_relax(robots, device)
+            actor.spreading = fast_spread(device)
 
     def plan(
         self, depth: Float[Tensor, "n height width"], vector: Float[Tensor, "n k"], fresh: Bool[Tensor, " n"]
@@ -64,18 +64,20 @@ class RolloutPlanner:
             part.copy_(now)
 
 
-def fast_relax(robots: int, device: torch.device) -> Relax:
-    """``relax`` for the grids of so many robots as one kernel, held against itself: what does not compute the same is
-    not used."""
+def fast_spread(device: torch.device) -> Spread:
+    """``spread`` as one kernel, held against itself: what does not compute the same is not used."""
     try:
-        from vinl.nav.grid_kernel import relax_in_blocks
+        from vinl.nav.grid_kernel import spread_in_blocks
     except ImportError as error:
-        print(f"warning: no Triton ({error}); grids are planned on four times slower", file=sys.stderr)
-        return relax
+        print(f"warning: no Triton ({error}); grids are planned on much slower", file=sys.stderr)
+        return spread
     random = torch.Generator("cpu").manual_seed(0)
-    distance, cost = (torch.rand(robots, SIDE, SIDE, generator=random).to(device) for _ in range(2))
-    difference = float((relax_in_blocks(30 * distance, cost) - relax(30 * distance, cost)).abs().max())
-    if difference < 1e-4:  # not of NaN
-        return relax_in_blocks
+    walls = torch.rand(8, SIDE, SIDE, generator=random) < 0.2
+    cost = torch.where(walls, 20.0, CELL).to(device)
+    distance = torch.full_like(cost, FAR)
+    distance[:, SIDE // 3, SIDE // 2] = 0.0
+    difference = float((spread_in_blocks(distance, cost) - spread(distance, cost)).abs().max())
+    if difference < 1e-3:  # not of NaN
+        return spread_in_blocks
     print(f"warning: paths of the kernel differ by {difference:g} m; it is not used, which is slower", file=sys.stderr)
-    return relax
+    return spread

@@ -18,8 +18,8 @@ AHEAD = (5, 10, 20)
 PLAN_SIZE = 2 * len(AHEAD) + 2
 """Numbers that ``plan_path`` gives."""
 
-ROUNDS, STEPS = 16, 8
-"""Distances spread by one cell in each step: paths of up to 128 cells, 19 m, within the grid."""
+_STEPS = 128
+"""Distances spread by one cell in each: paths of up to 19 m within the grid."""
 
 _FREE = -0.1
 """Cells below this are taken for free."""
@@ -38,30 +38,34 @@ _AT_A_TIME = 16
 FAR = 1e3
 """Before anything is known of a cell's distance [m]."""
 
-Relax = Callable[[Tensor, Tensor], Tensor]
+Spread = Callable[[Tensor, Tensor], Tensor]
 
 
-def relax(distance: Float[Tensor, "n side side"], cost: Float[Tensor, "n side side"]) -> Float[Tensor, "n side side"]:
-    """Distances after ``STEPS`` steps to the eight neighbours, whose cells are crossed at this cost [m]."""
+def spread(distance: Float[Tensor, "n side side"], cost: Float[Tensor, "n side side"]) -> Float[Tensor, "n side side"]:
+    """Distances [m] after ``_STEPS`` steps to the eight neighbours, whose cells are crossed at this cost [m]; on a CPU
+    only until no distance becomes shorter."""
+    watched = distance.device.type == "cpu" and not torch.compiler.is_compiling()
     diagonal = cost * 2.0**0.5
-    for _ in range(STEPS):
-        d = F.pad(distance, (1, 1, 1, 1), value=FAR)
+    for k in range(_STEPS):
+        before, d = distance, F.pad(distance, (1, 1, 1, 1), value=FAR)
         up, down, middle = d[:, :-2], d[:, 2:], d[:, 1:-1]
         beside = torch.minimum(middle[..., :-2], middle[..., 2:])
         straight = torch.minimum(torch.minimum(up[..., 1:-1], down[..., 1:-1]), beside)
         upper, lower = torch.minimum(up[..., :-2], up[..., 2:]), torch.minimum(down[..., :-2], down[..., 2:])
         oblique = torch.minimum(upper, lower)
         distance = torch.minimum(distance, torch.minimum(straight + cost, oblique + diagonal))
+        if watched and k % 8 == 7 and torch.equal(before, distance):  # elsewhere to look would be to wait
+            break
     return distance
 
 
-def plan_path(state: GridState, goal: Float[Tensor, "n 2"], spread: Relax = relax) -> Float[Tensor, "n plan"]:
+def plan_path(state: GridState, goal: Float[Tensor, "n 2"], spreading: Spread = spread) -> Float[Tensor, "n plan"]:
     """What a robot is told of the path.
 
     Args:
         state: of the grids.
         goal: in the heading frame [m]; outside of the grid the way to it is taken for straight.
-        spread: ``relax``, or the same compiled.
+        spreading: ``spread``, or what does the same.
 
     Returns:
         Cosine and sine of the bearing of the path's points ``AHEAD``; its length / 10 m, held to 4; and how much longer
@@ -78,12 +82,12 @@ def plan_path(state: GridState, goal: Float[Tensor, "n 2"], spread: Relax = rela
     middles = (here[..., None] + around + 0.5) * CELL - pose[:, :2, None]  # (n, 2, SIDE) from the robot
     x, y = middles[:, 0, :, None] - towards[:, :1, None], middles[:, 1, None, :] - towards[:, 1:, None]
     straight = (x * x + y * y).sqrt()
-    distance = spread_distances(cells, straight, spread)
+    distance = spread_distances(cells, straight, spreading)
     return _describe(distance, middles, towards, c, s)
 
 
 def spread_distances(
-    cells: Float[Tensor, "n side side"], straight: Float[Tensor, "n side side"], spread: Relax = relax
+    cells: Float[Tensor, "n side side"], straight: Float[Tensor, "n side side"], spreading: Spread = spread
 ) -> Float[Tensor, "n side side"]:
     """Length of the path from each cell to the goal [m], with what it costs to come near to something.
 
@@ -91,10 +95,9 @@ def spread_distances(
         cells: see ``GridState``, the robot's in the middle.
         straight: distance of each cell to the goal [m].
     """
-    watched = cells.device.type == "cpu" and not torch.compiler.is_compiling()
-    if watched and len(cells) > _AT_A_TIME:
+    if cells.device.type == "cpu" and len(cells) > _AT_A_TIME and not torch.compiler.is_compiling():
         parts = zip(cells.split(_AT_A_TIME), straight.split(_AT_A_TIME), strict=True)
-        return torch.cat([spread_distances(*part, spread) for part in parts])
+        return torch.cat([spread_distances(*part, spreading) for part in parts])
     wall = close_corners(((cells - OCCUPIED) / (1 - OCCUPIED)).clamp(min=0))
     solid = (wall > 0).float()
     near, around = F.max_pool2d(solid, 3, 1, 1), F.max_pool2d(solid, 5, 1, 2)
@@ -105,11 +108,7 @@ def spread_distances(
     at_goal = straight < 0.75 * CELL
     beyond = straight + _OUTSIDE * at_goal.flatten(1).any(1)[:, None, None]
     distance = torch.where(at_goal, straight, torch.where(edge > 0, beyond, FAR))
-    for _ in range(ROUNDS):
-        before, distance = distance, spread(distance, cost)
-        if watched and torch.equal(before, distance):  # elsewhere to look would be to wait
-            break
-    return distance
+    return spreading(distance, cost)
 
 
 def close_corners(wall: Float[Tensor, "n side side"]) -> Float[Tensor, "n side side"]:

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 from vinl.config.loader import build_config
 from vinl.policies.depth_memory import DepthMemory, State
-from vinl.policies.grid_path import PLAN_SIZE, Relax, plan_path, relax
+from vinl.policies.grid_path import PLAN_SIZE, Spread, plan_path, spread
 from vinl.policies.grid_ranges import DIRECTIONS, measure_ranges
 from vinl.policies.networks import PolicyNetwork
 from vinl.policies.occupancy_grid import GridState, OccupancyGrid
@@ -53,7 +53,7 @@ class NavActor(PolicyNetwork):
         image: (height, width) [pixels], or None if blind.
         feature_size: numbers that ``look`` returns.
         input_size: numbers that ``look`` takes: those observed, and the plan's.
-        spread: what distances are spread with on the grid; may be replaced by the same, compiled.
+        spreading: what distances are spread with on the grid; may be replaced by what does the same faster.
     """
 
     observation_size = OBSERVATION_SIZE
@@ -78,7 +78,7 @@ class NavActor(PolicyNetwork):
         self.observation_size = GOAL_SIZE + previous
         self.keep_arguments(locals())
         self.grid = None if grid is None else OccupancyGrid(build_config(Camera, grid))
-        self.spread: Relax = relax
+        self.spreading: Spread = spread
         told = PLAN_SIZE + DIRECTIONS if self.grid else 0
         self.input_size = self.observation_size + told
         self.goal = nn.Linear(GOAL_SIZE, embedding)
@@ -148,7 +148,7 @@ class NavActor(PolicyNetwork):
         asked = (vector[:, GOAL_SIZE] + 1) / 2  # the action before the step
         now = self.grid.see(GridState(*grid), depth, asked, vector[:, -STEP_SIZE:], fresh)
         goal = vector[:, 1:GOAL_SIZE] * (vector[:, :1] * DISTANCE_UNIT)
-        return torch.cat([vector, plan_path(now, goal, self.spread), measure_ranges(now)], 1), tuple(now)
+        return torch.cat([vector, plan_path(now, goal, self.spreading), measure_ranges(now)], 1), tuple(now)
 
     def look(
         self,
