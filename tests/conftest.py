@@ -42,10 +42,11 @@ for _name, _value in {
 
 
 def _checked_modules() -> list[str]:
-    """All modules of vinl but those with Warp kernels: Warp compiles a function's source and bears no wrapper."""
+    """All modules of vinl but those with kernels: Warp and Triton compile a function's source and bear no wrapper."""
     root = Path(__file__).resolve().parent.parent
     files = [p for p in sorted((root / "vinl").glob("*/**/*.py")) if p.name != "__init__.py"]
-    return [".".join(p.relative_to(root).with_suffix("").parts) for p in files if "@wp." not in p.read_text()]
+    plain = [p for p in files if not any(kernel in p.read_text() for kernel in ("@wp.", "@triton."))]
+    return [".".join(p.relative_to(root).with_suffix("").parts) for p in plain]
 
 
 _checker = ModuleType("vinl_type_checker")
