@@ -150,8 +150,8 @@ class OccupancyGrid(nn.Module):
         x, y = turned(pose[:, 2:], ahead, left)
         limit = (SIDE // 2 - 1) * CELL
         chosen = chosen & (x.abs() < limit) & (y.abs() < limit)
-        index = index_of(torch.stack([x, y], -1) + pose[:, None, :2])
-        return torch.zeros(len(pose), SIDE**2, device=pose.device).scatter_reduce(1, index, chosen.float(), "amax")
+        index = index_of(torch.stack([x, y], -1) + pose[:, None, :2]).masked_fill(~chosen, SIDE**2)
+        return torch.zeros(len(pose), SIDE**2 + 1, device=pose.device).scatter(1, index, 1.0)[:, :-1]
 
 
 def known_cells(state: GridState) -> Float[Tensor, "n cells"]:
