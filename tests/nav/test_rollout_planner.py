@@ -13,13 +13,16 @@ from vinl.rl.learning_rate import DeviceRate
 from vinl.robot.cameras import NAVIGATION_CAMERA
 
 N, STEPS, HEIGHT, WIDTH = 4, 6, 16, 24
-CAMERA = NAVIGATION_CAMERA.describe() | {"height": HEIGHT, "width": WIDTH}
+GRID = {
+    "camera": NAVIGATION_CAMERA.describe() | {"height": HEIGHT, "width": WIDTH},
+    "forward_speed": [-0.3, 0.8],
+}
 
 
 @pytest.fixture
 def actor():
     torch.manual_seed(0)
-    return NavActor("cnn", HEIGHT, WIDTH, 8, 8, 16, 1, previous=5, grid=CAMERA)
+    return NavActor("cnn", HEIGHT, WIDTH, 8, 8, 16, 1, previous=5, grid=GRID)
 
 
 def draw(steps=STEPS):

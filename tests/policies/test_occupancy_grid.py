@@ -20,7 +20,8 @@ from vinl.world.grid import GridFrame
 from vinl.world.mesh import box_mesh, heightfield_mesh, join_meshes
 
 NOBODY, ALL = torch.tensor([False]), torch.tensor([True])
-HALF = torch.tensor([0.5])  # of the full speed
+HALF = torch.tensor([0.4])  # m/s
+GRID = {"camera": {**NAVIGATION_CAMERA.describe(), "width": 32, "height": 24}, "forward_speed": [-0.3, 0.8]}
 WALL = (3.0, 0.0, 0.0, 0.2, 4.0, 0.0, 2.0)  # 2.9 to 3.1 m ahead, 4 m wide, 2 m high
 BLOCK = (1.5, 0.0, 0.0, 0.2, 1.0, 0.0, 0.2)  # of clutter, to be stepped over
 
@@ -92,6 +93,14 @@ def test_what_holds_the_robot_unseen_is_walked_around_and_tried_again_later() ->
     assert plan_path(state, goal)[0, 2] > 0.9
 
 
+def test_what_holds_a_robot_that_walks_back_is_behind_it() -> None:
+    grid, state = OccupancyGrid(NAVIGATION_CAMERA), drawn([])
+    blank = torch.zeros(1, NAVIGATION_CAMERA.height, NAVIGATION_CAMERA.width)
+    state = grid.see(state, blank, torch.tensor([-0.3]), torch.zeros(1, 3), NOBODY)
+    held = state.bumps[0, 0].nonzero().flatten().tolist()
+    assert set(held) == {int(index_of(torch.tensor([-0.45, y]))) for y in (-0.24, -0.12, 0.0, 0.12, 0.24)}
+
+
 def drawn(walls: list[tuple[float, float, float, float]]) -> GridState:
     """A grid on which rectangles (x, y from, x, y to) [m] are occupied and all else is free."""
     state = OccupancyGrid.start(1)
@@ -147,9 +156,7 @@ def test_a_turned_robot_is_told_in_its_own_frame() -> None:
 
 def test_a_step_at_a_time_is_the_same_as_all_at_once() -> None:
     torch.manual_seed(0)
-    actor = NavActor(
-        "cnn", 24, 32, 16, 8, 16, 1, previous=5, grid={**NAVIGATION_CAMERA.describe(), "width": 32, "height": 24}
-    )
+    actor = NavActor("cnn", 24, 32, 16, 8, 16, 1, previous=5, grid=GRID)
     depth, vector = torch.rand(5, 3, 24, 32), torch.randn(5, 3, 8)
     fresh = torch.zeros(5, 3, dtype=torch.bool)
     fresh[0], fresh[3, 1] = True, True

@@ -208,7 +208,8 @@ def build_actor(config: NavConfig) -> NavActor:
     sizes = asdict(config.network)
     if sizes.pop("grid"):
         assert camera is not None  # held to by the config
-        sizes["grid"] = camera.record().describe()
+        speeds = list(config.robot.velocity_range.forward_speed)
+        sizes["grid"] = {"camera": camera.record().describe(), "forward_speed": speeds}
     return NavActor(**{**sizes, **image, "previous": previous})
 
 

@@ -46,8 +46,9 @@ class NavActor(PolicyNetwork):
         planes: channels of the ResNet's first stage.
         previous: numbers on the last step: 2 of the action or the motion, 4 of both, 5 of the action and the step.
         channels: of the image: 1, or 2 with one for the pixels without a return.
-        grid: record of the camera whose images an occupancy grid is kept up from, and a path planned on it that the
-            network is told of; ``previous`` is 5 then. None: no grid.
+        grid: an occupancy grid is kept up, and the network is told of a path planned on it; ``previous`` is 5 then.
+            ``camera`` is the record of the images' camera, ``forward_speed`` what the actions -1 and 1 ask for [m/s].
+            None: no grid.
 
     Attributes:
         image: (height, width) [pixels], or None if blind.
@@ -77,7 +78,8 @@ class NavActor(PolicyNetwork):
         super().__init__()
         self.observation_size = GOAL_SIZE + previous
         self.keep_arguments(locals())
-        self.grid = None if grid is None else OccupancyGrid(build_config(Camera, grid))
+        self.grid = None if grid is None else OccupancyGrid(build_config(Camera, grid["camera"]))
+        self.speeds = (0.0, 0.0) if grid is None else tuple(grid["forward_speed"])
         self.spreading: Spread = spread
         told = PLAN_SIZE + DIRECTIONS if self.grid else 0
         self.input_size = self.observation_size + told
@@ -145,7 +147,8 @@ class NavActor(PolicyNetwork):
     ) -> tuple[Float[Tensor, "n input"], State]:
         """One step's vector with what is planned behind it, and the grid after the step; holds no weights."""
         assert self.grid is not None
-        asked = (vector[:, GOAL_SIZE] + 1) / 2  # the action before the step
+        slowest, fastest = self.speeds
+        asked = slowest + (vector[:, GOAL_SIZE] + 1) / 2 * (fastest - slowest)  # by the action before the step
         now = self.grid.see(GridState(*grid), depth, asked, vector[:, -STEP_SIZE:], fresh)
         goal = vector[:, 1:GOAL_SIZE] * (vector[:, :1] * DISTANCE_UNIT)
         return torch.cat([vector, plan_path(now, goal, self.spreading), measure_ranges(now)], 1), tuple(now)

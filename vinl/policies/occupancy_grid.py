@@ -34,12 +34,12 @@ _HIT, _PASSED = 0.6, 0.35
 """How far a cell moves to occupied (1) where a ray ends, and to free (-1) where one passes."""
 
 
-_ASKED, _CAME = 0.3, 0.06
-"""A robot that asked for more than this fraction of its full speed, and came no farther than this [m], has met
-something that it does not see: ..."""
+_MET = ((0.24, 0.06), (0.12, 0.03))
+"""A robot that asked for more than the first [m/s], and came no farther than the second [m], has met something that it
+does not see. The second pair is for walking back."""
 
 _BUMPS = tuple((0.45, y) for y in (-0.24, -0.12, 0.0, 0.12, 0.24))
-"""... these places of its heading frame [m] are occupied, whatever rays pass them, ..."""
+"""Then these places of its heading frame [m], or those behind it, are occupied, whatever rays pass them, ..."""
 
 _FADE, PASSABLE = 0.98, 0.5
 """... until this factor at every step has brought it below the other, after 34 steps: then it may try again."""
@@ -103,7 +103,7 @@ class OccupancyGrid(nn.Module):
         Args:
             state: before it.
             depth: as a fraction of the camera's far limit.
-            asked: fraction of the full forward speed that the step was to have.
+            asked: forward speed that the step was to have [m/s].
             step: forward, left [m] and turn [rad] since the last image, in the heading frame of that.
             fresh: an episode begins: nothing is known.
         """
@@ -113,9 +113,14 @@ class OccupancyGrid(nn.Module):
         stale = _place(cell_of(before)) != _place(cell_of(after))  # (n, 2, SIDE) stand for other ground now
         unknown = (stale[:, 0, :, None] | stale[:, 1, None, :]).flatten(1) | fresh[:, None]
         cells, bumps = (torch.where(unknown, 0.0, part[0]) for part in (state.cells, state.bumps))
-        held = (asked > _ASKED) & ((step[:, 0] ** 2 + step[:, 1] ** 2).sqrt() < _CAME) & ~fresh
-        met = self._mark(after, self.held_at[:1], self.held_at[1:], held[:, None].expand(-1, len(_BUMPS)))
-        bumps = torch.maximum(_FADE * bumps, met)
+        met: list[Tensor] = []
+        came = step[:, :2].square().sum(1).sqrt()
+        for way, (speed, far) in zip((1, -1), _MET, strict=True):
+            held = (way * asked > speed) & (came < far) & ~fresh
+            met.append(
+                self._mark(after, way * self.held_at[:1], self.held_at[1:], held[:, None].expand(-1, len(_BUMPS)))
+            )
+        bumps = torch.maximum(_FADE * bumps, torch.maximum(*met))
         hit, passed = self._trace(depth.float() * self.far, after)
         moved = torch.where(passed > 0, cells - _PASSED * (cells + 1), cells)
         return GridState(after[None], torch.where(hit > 0, cells + _HIT * (1 - cells), moved)[None], bumps[None])
