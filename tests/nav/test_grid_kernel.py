@@ -12,8 +12,9 @@ COMPARE = """
 import torch
 from vinl.nav.grid_kernel import spread_in_blocks
 from vinl.policies.grid_path import FAR, spread
-from vinl.policies.occupancy_grid import CELL, SIDE
+from vinl.policies.occupancy_grid import CELL
 
+SIDE = 40  # not a power of two, which lanes are
 walls = torch.rand(2, SIDE, SIDE, generator=torch.Generator().manual_seed(0)) < 0.2
 cost = torch.where(walls, 20.0, CELL)
 distance = torch.full_like(cost, FAR)

@@ -1,5 +1,6 @@
-"""``spread`` as one Triton kernel: a block of threads for each grid sweeps over its rows and columns, to and fro, until
-no distance becomes shorter [Zhao 2005]. Seven pairs of sweeps do what takes a hundred steps of all cells at once."""
+"""``spread`` as one Triton kernel: a warp for each grid sweeps over its rows, down and up, until no distance becomes
+shorter [Zhao 2005]; along a row distances spread in one scan. On an H200 4,096 grids take 1.5 ms; in steps of all cells
+at once, in one kernel too, 9.8 ms."""
 
 # pyright: reportMissingImports=false, reportUnknownMemberType=false
 from __future__ import annotations
@@ -12,54 +13,64 @@ from torch import Tensor
 
 from vinl.policies.grid_path import FAR
 
-_ROUNDS = 40
-"""So many times over rows and columns at most; mazes of homes take five."""
+_ENOUGH = 1e-4
+"""Distances that become shorter by less than this are done [m]."""
+
+_ROUNDS = 64
+"""So many times down and up at most; mazes of homes take five."""
 
 
 @triton.jit
-def _sweep(
-    distance,
-    cost,
-    ACROSS: tl.constexpr,
-    ALONG: tl.constexpr,
-    FORWARD: tl.constexpr,
-    SIDE: tl.constexpr,
-    LANES: tl.constexpr,
-    FAR: tl.constexpr,
-):
+def _beyond(cost, distance, next_cost, next_distance):
+    return cost + next_cost, tl.minimum(next_distance, distance + next_cost)
+
+
+@triton.jit
+def _sweep(distance, cost, FORWARD: tl.constexpr, SIDE: tl.constexpr, LANES: tl.constexpr, FAR: tl.constexpr):
     lane = tl.arange(0, LANES)
     inside = lane < SIDE
+    left, right = tl.maximum(lane - 1, 0), tl.minimum(lane + 1, LANES - 1)
+    at = lane if FORWARD else (SIDE - 1) * SIDE + lane
+    ahead: tl.constexpr = SIDE if FORWARD else -SIDE
+    row = tl.full([LANES], FAR, tl.float32)  # no row before the first
     shorter = tl.zeros([LANES], tl.float32)
-    for k in range(1, SIDE):
-        here = (k if FORWARD else SIDE - 1 - k) * ACROSS + lane * ALONG
-        behind = here - ACROSS if FORWARD else here + ACROSS
-        straight = tl.load(distance + behind, inside, FAR)
-        left = tl.load(distance + behind - ALONG, inside & (lane > 0), FAR)
-        right = tl.load(distance + behind + ALONG, lane < SIDE - 1, FAR)
-        crossed = tl.load(cost + here, inside, 0.0)
-        before = tl.load(distance + here, inside, FAR)
-        oblique = tl.minimum(left, right) + crossed * 1.4142135623730951
-        after = tl.minimum(before, tl.minimum(straight + crossed, oblique))
-        tl.store(distance + here, after, inside)
-        shorter = tl.maximum(shorter, before - after)
-        tl.debug_barrier()  # the next line reads what other threads of the block wrote
-    return shorter
+    next_cost, next_before = tl.load(cost + at, inside, FAR), tl.load(distance + at, inside, FAR)
+    for k in range(SIDE):
+        crossed, before = next_cost, next_before
+        more = inside & (k < SIDE - 1)
+        next_cost = tl.load(cost + at + ahead, more, FAR)  # while this row is worked on
+        next_before = tl.load(distance + at + ahead, more, FAR)
+        oblique = tl.minimum(tl.gather(row, left, 0), tl.gather(row, right, 0)) + crossed * 1.4142135623730951
+        row = tl.minimum(before, tl.minimum(row + crossed, oblique))
+        _, row = tl.associative_scan((crossed, row), 0, _beyond)
+        _, row = tl.associative_scan((crossed, row), 0, _beyond, reverse=True)
+        tl.store(distance + at, row, inside)
+        shorter = tl.maximum(shorter, before - row)
+        at += ahead
+    return tl.max(shorter)
 
 
 @triton.jit
-def _spread(distance, cost, SIDE: tl.constexpr, LANES: tl.constexpr, ROUNDS: tl.constexpr, FAR: tl.constexpr):
+def _spread(
+    distance,
+    cost,
+    SIDE: tl.constexpr,
+    LANES: tl.constexpr,
+    ROUNDS: tl.constexpr,
+    ENOUGH: tl.constexpr,
+    FAR: tl.constexpr,
+):
     distance += tl.program_id(0) * SIDE * SIDE
     cost += tl.program_id(0) * SIDE * SIDE
     rounds = 0
     going = True
     while going:
-        down = _sweep(distance, cost, SIDE, 1, True, SIDE, LANES, FAR)
-        up = _sweep(distance, cost, SIDE, 1, False, SIDE, LANES, FAR)
-        right = _sweep(distance, cost, 1, SIDE, True, SIDE, LANES, FAR)
-        left = _sweep(distance, cost, 1, SIDE, False, SIDE, LANES, FAR)
-        shorter = tl.maximum(tl.maximum(down, up), tl.maximum(right, left))
+        down = _sweep(distance, cost, True, SIDE, LANES, FAR)
+        tl.debug_barrier()  # the next sweep reads what other threads of the warp wrote
+        up = _sweep(distance, cost, False, SIDE, LANES, FAR)
+        tl.debug_barrier()
         rounds += 1
-        going = (tl.max(shorter) > 0) & (rounds < ROUNDS)
+        going = (tl.maximum(down, up) > ENOUGH) & (rounds < ROUNDS)
 
 
 def spread_in_blocks(
@@ -69,6 +80,6 @@ def spread_in_blocks(
     distance, side = distance.clone(memory_format=torch.contiguous_format), distance.shape[-1]
     lanes = triton.next_power_of_2(side)
     _spread[(len(distance),)](  # pyright: ignore[reportIndexIssue]
-        distance, cost.contiguous(), SIDE=side, LANES=lanes, ROUNDS=_ROUNDS, FAR=FAR, num_warps=lanes // 32
+        distance, cost.contiguous(), SIDE=side, LANES=lanes, ROUNDS=_ROUNDS, ENOUGH=_ENOUGH, FAR=FAR, num_warps=1
     )
     return distance

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import torch
 import torch.nn.functional as F
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from vinl.policies.occupancy_grid import CELL, OCCUPIED, SIDE, GridState, cell_of, known_cells
@@ -71,14 +71,16 @@ def plan_path(state: GridState, goal: Float[Tensor, "n 2"], spreading: Spread = 
         Cosine and sine of the bearing of the path's points ``AHEAD``; its length / 10 m, held to 4; and how much longer
         it is than the straight line / 5 m, held to 4.
     """
-    pose, n = state.pose[0], state.pose.shape[1]
+    pose = state.pose[0]
     c, s = pose[:, 2].cos(), pose[:, 2].sin()
     towards = torch.stack([c * goal[:, 0] - s * goal[:, 1], s * goal[:, 0] + c * goal[:, 1]], 1)  # in the grid's axes
     here = cell_of(pose)
     around = torch.arange(SIDE, device=pose.device) - SIDE // 2
     column, row = ((here[:, k, None] + around).remainder(SIDE) for k in (0, 1))
-    index = (column[:, :, None] * SIDE + row[:, None, :]).flatten(1)
-    cells = known_cells(state).gather(1, index).reshape(n, SIDE, SIDE)  # the robot's is in the middle
+    columns, rows = column[:, :, None].expand(-1, -1, SIDE), row[:, None, :].expand(-1, SIDE, -1)
+    cells = (
+        known_cells(state).unflatten(1, (SIDE, SIDE)).gather(1, columns).gather(2, rows)
+    )  # the robot's is in the middle
     middles = (here[..., None] + around + 0.5) * CELL - pose[:, :2, None]  # (n, 2, SIDE) from the robot
     x, y = middles[:, 0, :, None] - towards[:, :1, None], middles[:, 1, None, :] - towards[:, 1:, None]
     straight = (x * x + y * y).sqrt()
@@ -98,23 +100,30 @@ def spread_distances(
     if cells.device.type == "cpu" and len(cells) > _AT_A_TIME and not torch.compiler.is_compiling():
         parts = zip(cells.split(_AT_A_TIME), straight.split(_AT_A_TIME), strict=True)
         return torch.cat([spread_distances(*part, spreading) for part in parts])
-    wall = close_corners(((cells - OCCUPIED) / (1 - OCCUPIED)).clamp(min=0))
-    solid = (wall > 0).float()
-    near, around = F.max_pool2d(solid, 3, 1, 1), F.max_pool2d(solid, 5, 1, 2)
-    unsure = near * (cells > _FREE)
-    cost = CELL * (1 + (_NEAR - _AROUND) * near + _AROUND * around + _UNSURE * unsure + _THROUGH * wall)
-    edge = torch.ones_like(solid[:1])
-    edge[:, 1:-1, 1:-1] = 0.0
+    wall = close_corners(cells.clamp(min=OCCUPIED))
+    near = _grown(wall > OCCUPIED)
+    beside = torch.where(cells > _FREE, _NEAR + _UNSURE, _NEAR)
+    dearer = torch.where(near, beside, torch.where(_grown(near), _AROUND, 0.0))
+    cost = CELL * (1 + dearer + _THROUGH / (1 - OCCUPIED) * (wall - OCCUPIED))
+    edge = torch.ones_like(near[:1])
+    edge[:, 1:-1, 1:-1] = False
     at_goal = straight < 0.75 * CELL
     beyond = straight + _OUTSIDE * at_goal.flatten(1).any(1)[:, None, None]
-    distance = torch.where(at_goal, straight, torch.where(edge > 0, beyond, FAR))
+    distance = torch.where(at_goal, straight, torch.where(edge, beyond, FAR))
     return spreading(distance, cost)
+
+
+def _grown(cells: Bool[Tensor, "n side side"]) -> Bool[Tensor, "n side side"]:
+    """These and their eight neighbours."""
+    c = F.pad(cells, (1, 1, 1, 1))
+    column = c[:, :-2] | c[:, 1:-1] | c[:, 2:]
+    return column[..., :-2] | column[..., 1:-1] | column[..., 2:]
 
 
 def close_corners(wall: Float[Tensor, "n side side"]) -> Float[Tensor, "n side side"]:
     """Cells that have a wall both above or below and to the left or right become as much of one as these: an oblique
     wall is a flight of stairs on the grid, and a path would slip through between two steps."""
-    w = F.pad(wall, (1, 1, 1, 1))
+    w = F.pad(wall, (1, 1, 1, 1), value=OCCUPIED)
     over = torch.maximum(w[:, :-2, 1:-1], w[:, 2:, 1:-1])
     beside = torch.maximum(w[:, 1:-1, :-2], w[:, 1:-1, 2:])
     return torch.maximum(wall, torch.minimum(over, beside))

@@ -120,16 +120,17 @@ class OccupancyGrid(nn.Module):
             met.append(
                 self._mark(after, way * self.held_at[:1], self.held_at[1:], held[:, None].expand(-1, len(_BUMPS)))
             )
-        bumps = torch.maximum(_FADE * bumps, torch.maximum(*met))
+        bumps = torch.where(met[0] | met[1], 1.0, _FADE * bumps)
         hit, passed = self._trace(depth.float() * self.far, after)
-        moved = torch.where(passed > 0, cells - _PASSED * (cells + 1), cells)
-        return GridState(after[None], torch.where(hit > 0, cells + _HIT * (1 - cells), moved)[None], bumps[None])
+        free, occupied = (torch.full((), end, device=cells.device) for end in (-1.0, 1.0))
+        cells = torch.where(hit, cells.lerp(occupied, _HIT), torch.where(passed, cells.lerp(free, _PASSED), cells))
+        return GridState(after[None], cells[None], bumps[None])
 
     def _trace(
         self, depth: Float[Tensor, "n height width"], pose: Float[Tensor, "n 3"]
-    ) -> tuple[Float[Tensor, "n cells"], Float[Tensor, "n cells"]]:
-        """Cells in which a ray ends, and cells that one passes: 1, others 0. Each column of the image is a ray, to the
-        nearest obstacle in it."""
+    ) -> tuple[Bool[Tensor, "n cells"], Bool[Tensor, "n cells"]]:
+        """Cells in which a ray ends, and cells that one passes. Each column of the image is a ray, to the nearest
+        obstacle in it."""
         height = MOUNT_HEIGHT - self.down[:, None] * depth
         solid = (depth > 0) & (depth < 0.99 * self.far) & (height > _LOWEST + _RISE * depth) & (height < _HIGHEST)
         ends = torch.where(solid, depth, 2 * self.far).amin(1)  # (n, width)
@@ -140,7 +141,7 @@ class OccupancyGrid(nn.Module):
         left = (along[:, None] * self.left).flatten()
         passed = self._mark(pose, ahead[None], left[None], free)
         here = torch.zeros_like(pose[:, :1])
-        passed = torch.maximum(passed, self._mark(pose, here, here, torch.ones_like(here, dtype=torch.bool)))
+        passed = passed | self._mark(pose, here, here, torch.ones_like(here, dtype=torch.bool))
         end = ends + 0.2 * CELL  # in the cell behind the surface, not before it
         return self._mark(pose, self.ahead + end, end * self.left, ends < _SEEN), passed
 
@@ -150,13 +151,14 @@ class OccupancyGrid(nn.Module):
         ahead: Float[Tensor, "*n k"],
         left: Float[Tensor, "*n k"],
         chosen: Bool[Tensor, "n k"],
-    ) -> Float[Tensor, "n cells"]:
-        """1 in the cells of the points of the heading frame that are chosen and lie on the grid."""
+    ) -> Bool[Tensor, "n cells"]:
+        """The cells of the points of the heading frame that are chosen and lie on the grid."""
         x, y = turned(pose[:, 2:], ahead, left)
         limit = (SIDE // 2 - 1) * CELL
         chosen = chosen & (x.abs() < limit) & (y.abs() < limit)
         index = index_of(torch.stack([x, y], -1) + pose[:, None, :2]).masked_fill(~chosen, SIDE**2)
-        return torch.zeros(len(pose), SIDE**2 + 1, device=pose.device).scatter(1, index, 1.0)[:, :-1]
+        blank = torch.zeros(len(pose), SIDE**2 + 1, dtype=torch.bool, device=pose.device)
+        return blank.scatter(1, index, True)[:, :-1]
 
 
 def known_cells(state: GridState) -> Float[Tensor, "n cells"]:
@@ -171,8 +173,8 @@ def cell_of(place: Float[Tensor, "*n k"]) -> Int[Tensor, "*n 2"]:
 
 def index_of(place: Float[Tensor, "*n 2"]) -> Int[Tensor, "*n"]:
     """Number of the cell of a place [m]."""
-    column, row = cell_of(place).remainder(SIDE).unbind(-1)
-    return column * SIDE + row
+    column, row = torch.floor(place / CELL).remainder(SIDE).unbind(-1)  # as floats: half of what whole numbers take
+    return (column * SIDE + row).long()
 
 
 def turned(angle: Float[Tensor, "n 1"], x: Float[Tensor, "*n k"], y: Float[Tensor, "*n k"]) -> tuple[Tensor, Tensor]:
