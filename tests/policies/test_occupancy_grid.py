@@ -43,7 +43,7 @@ def look(boxes: list[tuple[float, ...]], poses: list[tuple[float, float, float]]
 
 def cells(state: GridState, places: list[tuple[float, float]]) -> list[float]:
     """Of places in the frame of the first pose."""
-    return state.cells[0, 0, index_of(torch.tensor(places))].tolist()
+    return state.cells[0, 0, index_of(*torch.tensor(places).unbind(-1))].tolist()
 
 
 def test_walls_are_occupied_what_lies_before_them_is_free_and_clutter_is_nothing() -> None:
@@ -66,7 +66,7 @@ def test_a_robot_that_begins_anew_knows_nothing_of_before() -> None:
     blank = torch.zeros(1, NAVIGATION_CAMERA.height, NAVIGATION_CAMERA.width)
     fresh = OccupancyGrid(NAVIGATION_CAMERA).see(state, blank, HALF, torch.tensor([[0.4, 0.0, 0.3]]), ALL)
     assert not fresh.pose.any()
-    assert (fresh.cells[0, 0] != 0).nonzero().flatten().tolist() == [int(index_of(torch.zeros(2)))]
+    assert (fresh.cells[0, 0] != 0).nonzero().flatten().tolist() == [int(index_of(*torch.zeros(2)))]
 
 
 def test_ground_left_behind_is_forgotten() -> None:
@@ -98,7 +98,7 @@ def test_what_holds_a_robot_that_walks_back_is_behind_it() -> None:
     blank = torch.zeros(1, NAVIGATION_CAMERA.height, NAVIGATION_CAMERA.width)
     state = grid.see(state, blank, torch.tensor([-0.3]), torch.zeros(1, 3), NOBODY)
     held = state.bumps[0, 0].nonzero().flatten().tolist()
-    assert set(held) == {int(index_of(torch.tensor([-0.45, y]))) for y in (-0.24, -0.12, 0.0, 0.12, 0.24)}
+    assert set(held) == {int(index_of(*torch.tensor([-0.45, y]).unbind(-1))) for y in (-0.24, -0.12, 0.0, 0.12, 0.24)}
 
 
 def drawn(walls: list[tuple[float, float, float, float]]) -> GridState:
@@ -110,7 +110,7 @@ def drawn(walls: list[tuple[float, float, float, float]]) -> GridState:
     x, y = places.T
     for x0, y0, x1, y1 in walls:
         inside = (x > x0) & (x < x1) & (y > y0) & (y < y1)
-        state.cells[0, 0, index_of(places[inside])] = 1.0
+        state.cells[0, 0, index_of(*places[inside].unbind(-1))] = 1.0
     return state
 
 
@@ -136,7 +136,7 @@ def test_the_path_leads_around_a_wall_and_says_how_much_longer_it_is() -> None:
 def test_no_path_slips_through_an_oblique_wall() -> None:
     state = drawn([])
     for k in range(-20, 21):  # a diagonal of cells that touch by their corners alone
-        state.cells[0, 0, index_of(torch.tensor([2.0 + k * CELL + 0.01, k * CELL + 0.01]))] = 1.0
+        state.cells[0, 0, index_of(*torch.tensor([2.0 + k * CELL + 0.01, k * CELL + 0.01]).unbind(-1))] = 1.0
     told = plan_path(state, torch.tensor([[4.0, 0.0]]))[0].numpy()
     assert 10 * told[-2] > 6.5  # around one of its ends, 3 m aside
 

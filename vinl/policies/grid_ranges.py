@@ -25,6 +25,6 @@ def measure_ranges(state: GridState) -> Float[Tensor, "n directions"]:
     along = (torch.arange(round(_REACH / _STEP), device=pose.device) + 1) * _STEP
     ahead, left = ((part[:, None] * along).flatten()[None] for part in (angle.cos(), angle.sin()))
     x, y = turned(pose[:, 2:], ahead, left)
-    index = index_of(torch.stack([x, y], -1) + pose[:, None, :2])
+    index = index_of(x + pose[:, :1], y + pose[:, 1:2])
     held = (known_cells(state).gather(1, index) > OCCUPIED).unflatten(1, (DIRECTIONS, len(along)))
     return torch.where(held, along / _REACH, 1.0).amin(2)

@@ -156,7 +156,7 @@ class OccupancyGrid(nn.Module):
         x, y = turned(pose[:, 2:], ahead, left)
         limit = (SIDE // 2 - 1) * CELL
         chosen = chosen & (x.abs() < limit) & (y.abs() < limit)
-        index = index_of(torch.stack([x, y], -1) + pose[:, None, :2]).masked_fill(~chosen, SIDE**2)
+        index = index_of(x + pose[:, :1], y + pose[:, 1:2]).masked_fill(~chosen, SIDE**2)
         blank = torch.zeros(len(pose), SIDE**2 + 1, dtype=torch.bool, device=pose.device)
         return blank.scatter(1, index, True)[:, :-1]
 
@@ -171,9 +171,9 @@ def cell_of(place: Float[Tensor, "*n k"]) -> Int[Tensor, "*n 2"]:
     return torch.floor(place[..., :2] / CELL).long()
 
 
-def index_of(place: Float[Tensor, "*n 2"]) -> Int[Tensor, "*n"]:
+def index_of(x: Float[Tensor, "*n"], y: Float[Tensor, "*n"]) -> Int[Tensor, "*n"]:
     """Number of the cell of a place [m]."""
-    column, row = torch.floor(place / CELL).remainder(SIDE).unbind(-1)  # as floats: half of what whole numbers take
+    column, row = (torch.floor(part / CELL).remainder(SIDE) for part in (x, y))
     return (column * SIDE + row).long()
 
 
