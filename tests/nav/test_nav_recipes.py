@@ -10,9 +10,9 @@ from vinl.config.loader import dump_config, load_config
 from vinl.nav.config import NavConfig
 from vinl.policies.io import load_policy
 
-RECORD = {"lineage", "total_samples", "ppo.compiled", "network.places"}
+RECORD = {"lineage", "total_samples", "ppo.compiled", "network.places", "ppo.places"}
 """What a card says beside its settings, or what makes no other policy: how the network is computed, and an output that
-was off."""
+was off, with the weight of its loss."""
 
 
 @pytest.mark.parametrize(("name", "config"), [("nav", "nav/default"), ("nav-blind", "nav/blind")])
