@@ -11,7 +11,7 @@ import torch
 from vinl.chain.depth_cameras import DepthCameras
 from vinl.policies.grid_path import AHEAD, PLAN_SIZE, plan_path
 from vinl.policies.nav_actor import NavActor
-from vinl.policies.occupancy_grid import CELL, MOUNT_HEIGHT, SIDE, GridState, OccupancyGrid, cell_of, index_of
+from vinl.policies.occupancy_grid import CELL, MOUNT_HEIGHT, PASSABLE, SIDE, GridState, OccupancyGrid, cell_of, index_of
 from vinl.robot.aliengo import home_qpos
 from vinl.robot.cameras import NAVIGATION_CAMERA
 from vinl.sensing.preparation import prepare_depth
@@ -91,6 +91,17 @@ def test_what_holds_the_robot_unseen_is_walked_around_and_tried_again_later() ->
     for _ in range(40):
         state = grid.see(state, open_, torch.zeros(1), stood, NOBODY)
     assert plan_path(state, goal)[0, 2] > 0.9
+
+
+def test_a_door_whose_frame_is_touched_is_closed_only_where_that_goes_on() -> None:
+    grid, blank = OccupancyGrid(NAVIGATION_CAMERA), torch.zeros(1, NAVIGATION_CAMERA.height, NAVIGATION_CAMERA.width)
+    frame, stood = drawn([(0.4, 0.25, 0.6, 1.0)]), torch.zeros(1, 3)
+    marked = []
+    for state in (frame, drawn([])):
+        for _ in range(3):
+            state = grid.see(state, blank, HALF, stood, NOBODY)
+            marked.append(bool((state.bumps > PASSABLE).any()))
+    assert marked == [False, False, True, True, True, True]
 
 
 def test_what_holds_a_robot_that_walks_back_is_behind_it() -> None:

@@ -41,6 +41,13 @@ does not see. The second pair is for walking back."""
 _BUMPS = tuple((0.45, y) for y in (-0.24, -0.12, 0.0, 0.12, 0.24))
 """Then these places of its heading frame [m], or those behind it, are occupied, whatever rays pass them, ..."""
 
+_KNOWN_AT = tuple((0.2 + 0.1 * i, 0.1 * j) for i in range(5) for j in range(-3, 4))
+"""Where one of these places [m] is known to be occupied, it may have met that: a door is not closed because the robot
+touches its frame."""
+
+_DOUBTFUL = 0.2
+"""What such a step adds to the places of ``_BUMPS``: three in a row count as much as one that nothing explains."""
+
 _FADE, PASSABLE = 0.98, 0.5
 """... until this factor at every step has brought it below the other, after 34 steps: then it may try again."""
 
@@ -55,7 +62,7 @@ class GridState(NamedTuple):
     Attributes:
         pose: (1, n, 3) x, y [m] and heading [rad] since the episode began, by odometry.
         cells: (1, n, SIDE²) from free (-1) over unknown (0) to occupied (1), by what was seen.
-        bumps: (1, n, SIDE²) 1 where something held the robot, fading.
+        bumps: (1, n, SIDE²) up to 1 where something held the robot, fading.
     """
 
     pose: Tensor
@@ -73,6 +80,7 @@ class OccupancyGrid(nn.Module):
     left: Tensor
     down: Tensor
     held_at: Tensor
+    known_at: Tensor
 
     def __init__(self, camera: Camera) -> None:
         super().__init__()
@@ -83,6 +91,7 @@ class OccupancyGrid(nn.Module):
         self.register_buffer("left", -across * tan_x, persistent=False)
         self.register_buffer("down", down * tan_y, persistent=False)
         self.register_buffer("held_at", torch.tensor(_BUMPS, device="cpu").T.contiguous(), persistent=False)
+        self.register_buffer("known_at", torch.tensor(_KNOWN_AT, device="cpu").T.contiguous(), persistent=False)
 
     @staticmethod
     def start(n: int, device: torch.device | str | None = None) -> GridState:
@@ -113,14 +122,14 @@ class OccupancyGrid(nn.Module):
         stale = _place(cell_of(before)) != _place(cell_of(after))  # (n, 2, SIDE) stand for other ground now
         unknown = (stale[:, 0, :, None] | stale[:, 1, None, :]).flatten(1) | fresh[:, None]
         cells, bumps = (torch.where(unknown, 0.0, part[0]) for part in (state.cells, state.bumps))
-        met: list[Tensor] = []
-        came = step[:, :2].square().sum(1).sqrt()
-        for way, (speed, far) in zip((1, -1), _MET, strict=True):
-            held = (way * asked > speed) & (came < far) & ~fresh
-            met.append(
-                self._mark(after, way * self.held_at[:1], self.held_at[1:], held[:, None].expand(-1, len(_BUMPS)))
-            )
-        bumps = torch.where(met[0] | met[1], 1.0, _FADE * bumps)
+        back = asked < 0
+        fast, still = (torch.where(back, behind, ahead) for ahead, behind in zip(*_MET, strict=True))
+        held = (asked.abs() > fast) & (step[:, :2].square().sum(1).sqrt() < still) & ~fresh
+        way = torch.where(back, -1.0, 1.0)[:, None]
+        met = self._mark(after, way * self.held_at[:1], self.held_at[1:], held[:, None].expand(-1, len(_BUMPS)))
+        x, y = turned(after[:, 2:], way * self.known_at[:1], self.known_at[1:])
+        known = cells.gather(1, index_of(x + after[:, :1], y + after[:, 1:2])) > OCCUPIED
+        bumps = (_FADE * bumps + met * torch.where(known.any(1), _DOUBTFUL, 1.0)[:, None]).clamp(max=1.0)
         hit, passed = self._trace(depth.float() * self.far, after)
         free, occupied = (torch.full((), end, device=cells.device) for end in (-1.0, 1.0))
         cells = torch.where(hit, cells.lerp(occupied, _HIT), torch.where(passed, cells.lerp(free, _PASSED), cells))
@@ -148,8 +157,8 @@ class OccupancyGrid(nn.Module):
     @staticmethod
     def _mark(
         pose: Float[Tensor, "n 3"],
-        ahead: Float[Tensor, "*n k"],
-        left: Float[Tensor, "*n k"],
+        ahead: Float[Tensor, "#n k"],
+        left: Float[Tensor, "#n k"],
         chosen: Bool[Tensor, "n k"],
     ) -> Bool[Tensor, "n cells"]:
         """The cells of the points of the heading frame that are chosen and lie on the grid."""
@@ -177,7 +186,7 @@ def index_of(x: Float[Tensor, "*n"], y: Float[Tensor, "*n"]) -> Int[Tensor, "*n"
     return (column * SIDE + row).long()
 
 
-def turned(angle: Float[Tensor, "n 1"], x: Float[Tensor, "*n k"], y: Float[Tensor, "*n k"]) -> tuple[Tensor, Tensor]:
+def turned(angle: Float[Tensor, "n 1"], x: Float[Tensor, "#n k"], y: Float[Tensor, "#n k"]) -> tuple[Tensor, Tensor]:
     """Points of the heading frame in the grid's axes."""
     c, s = torch.cos(angle), torch.sin(angle)
     return c * x - s * y, s * x + c * y
