@@ -251,6 +251,21 @@ def test_footholds_of_a_policy_that_predicts_them():
     assert np.linalg.norm(seen.footholds.predicted - seen.feet, axis=1).max() < 0.15  # it has no command: as it stands
 
 
+def test_what_the_navigation_policy_remembers_stands_in_the_home(rough: Policy):
+    session = Session(LiveChain(open_home(PLAN, "none", 0, CONFIG), rough, "nav", CONFIG))
+    x, y = session.snapshot.qpos[:2]
+    assert not len(session.snapshot.occupied)
+    session.ask(SetGoal(x + 1.0, y))
+    seen = session.advance(60)
+    assert len(seen.occupied) > 20
+    assert (PLAN.boxes.distances(seen.occupied).min(0) < 0.15).mean() > 0.85  # but for edges far away
+    session.ask(Reset())
+    assert not len(session.advance(0).occupied)
+    session.ask(ChangePolicies(None, "oracle"))
+    session.ask(SetGoal(x + 1.0, y))
+    assert not len(session.advance(30).occupied)
+
+
 def test_errors_of_sensors_and_faults_are_those_of_the_evaluation(rough: Policy):
     def walk(*settings: str) -> Snapshot:
         rules = load_config(vinl.EvaluationConfig, "eval/default", settings)

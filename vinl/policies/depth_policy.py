@@ -48,6 +48,15 @@ class PlansFootholds(Protocol):
         ...
 
 
+@runtime_checkable
+class KeepsGrid(Protocol):
+    """A network whose memory may hold an occupancy grid."""
+
+    def occupied(self, state: State) -> list[Float[Tensor, "_ 2"]]:
+        """For each robot the cells that something stands on, in its heading frame [m]; empty without a grid."""
+        ...
+
+
 class DepthPolicy:
     """Observations (n, k) and depth images (n, H, W) to actions (n, a), without noise, on the device of its network.
 
@@ -129,6 +138,13 @@ class DepthPolicy:
         if not isinstance(self.network, PlansFootholds) or not len(self._fresh) or self._fresh.any():
             return {}
         return {"predicted": self.network.footholds(self._state).cpu().numpy()}
+
+    def occupied(self) -> list[Float[np.ndarray, "_ 2"]]:
+        """For each robot the cells that something stands on by the network's grid, in the heading frame that the robot
+        had in the last step [m]; nothing if it keeps no grid, or before the first step."""
+        if not isinstance(self.network, KeepsGrid) or not len(self._fresh) or self._fresh.any():
+            return []
+        return [places.cpu().numpy() for places in self.network.occupied(self._state)]
 
     def _begin(self, n: int) -> None:
         self._state = cast(DepthNetwork, self.network).initial_state(n, self.device)

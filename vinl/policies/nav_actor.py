@@ -13,7 +13,7 @@ from vinl.policies.depth_memory import DepthMemory, State
 from vinl.policies.grid_path import PLAN_SIZE, Spread, plan_path, spread
 from vinl.policies.grid_ranges import DIRECTIONS, measure_ranges
 from vinl.policies.networks import PolicyNetwork
-from vinl.policies.occupancy_grid import GridState, OccupancyGrid
+from vinl.policies.occupancy_grid import GridState, OccupancyGrid, find_occupied
 from vinl.robot.cameras import Camera
 
 GOAL_SIZE, PREVIOUS_SIZE = 3, 2
@@ -136,6 +136,10 @@ class NavActor(PolicyNetwork):
             told.append(more)
         feature, memory = self.look(depth, torch.stack(told), memory, fresh)
         return self.choose(feature), (*memory, *grid)
+
+    def occupied(self, state: State) -> list[Float[Tensor, "_ 2"]]:
+        """See ``find_occupied``; nothing without a grid."""
+        return [] if self.grid is None else find_occupied(GridState(*state[-len(GridState._fields) :]))
 
     @torch.no_grad()
     def plan(

@@ -175,6 +175,18 @@ def known_cells(state: GridState) -> Float[Tensor, "n cells"]:
     return torch.where(state.bumps[0] > PASSABLE, 1.0, state.cells[0])
 
 
+def find_occupied(state: GridState) -> list[Float[Tensor, "_ 2"]]:
+    """For each robot the middles of the cells that are taken for occupied, in its heading frame [m]."""
+    pose, occupied = state.pose[0], known_cells(state).unflatten(1, (SIDE, SIDE)) > OCCUPIED
+    cells = _place(cell_of(pose))
+    found = []
+    for k in range(len(pose)):
+        column, row = occupied[k].nonzero(as_tuple=True)
+        x, y = (cells[k, 0, column] + 0.5) * CELL - pose[k, 0], (cells[k, 1, row] + 0.5) * CELL - pose[k, 1]
+        found.append(torch.stack(turned(-pose[k, 2], x, y), 1))
+    return found
+
+
 def cell_of(place: Float[Tensor, "*n k"]) -> Int[Tensor, "*n 2"]:
     """Column and row, not wrapped, of a place [m]."""
     return torch.floor(place[..., :2] / CELL).long()
@@ -186,7 +198,7 @@ def index_of(x: Float[Tensor, "*n"], y: Float[Tensor, "*n"]) -> Int[Tensor, "*n"
     return (column * SIDE + row).long()
 
 
-def turned(angle: Float[Tensor, "n 1"], x: Float[Tensor, "#n k"], y: Float[Tensor, "#n k"]) -> tuple[Tensor, Tensor]:
+def turned(angle: Float[Tensor, "..."], x: Float[Tensor, "..."], y: Float[Tensor, "..."]) -> tuple[Tensor, Tensor]:
     """Points of the heading frame in the grid's axes."""
     c, s = torch.cos(angle), torch.sin(angle)
     return c * x - s * y, s * x + c * y
@@ -194,4 +206,5 @@ def turned(angle: Float[Tensor, "n 1"], x: Float[Tensor, "#n k"], y: Float[Tenso
 
 def _place(cell: Int[Tensor, "n 2"]) -> Int[Tensor, "n 2 side"]:
     """Which of the cells that do not move each column and row stands for with the robot in this one."""
-    return cell[..., None] + (torch.arange(SIDE, device=cell.device) - cell[..., None] + SIDE // 2).remainder(SIDE)
+    half = SIDE // 2
+    return cell[..., None] + (torch.arange(SIDE, device=cell.device) - cell[..., None] + half).remainder(SIDE) - half

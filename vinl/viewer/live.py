@@ -161,6 +161,7 @@ class LiveChain:
             foot_forces=np.linalg.norm(data.sensordata[self._forces].reshape(4, 3), axis=1),
             images=self._images,
             footholds=self._footholds,
+            occupied=self._occupied,
         )
 
     # ---- the robot -------------------------------------------------------------------------------------------------
@@ -212,6 +213,7 @@ class LiveChain:
         self._limb_steps = [0, 0, 0]
         self._command, self._since_goal = np.zeros((1, 3)), 0
         self._state, self._images = "standing", dict[str, DepthImage]()
+        self._occupied = np.zeros((0, 2))
         if self._goal is not None:
             self._go_to(self._goal)
 
@@ -246,7 +248,7 @@ class LiveChain:
         odometry = self._config.odometry
         self._reckoning = None if odometry.is_exact else DeadReckoning(odometry, [self._seed])
         self._goal, self._state, self._since_goal = goal, "walking", 0
-        self._choice = np.zeros((1, 2))
+        self._choice, self._occupied = np.zeros((1, 2)), np.zeros((0, 2))
         return f"goal: {route.geodesic_m:.1f} m to walk"
 
     def _decide(self, goal: Float[np.ndarray, "2"]) -> None:
@@ -256,6 +258,9 @@ class LiveChain:
         depth = None if self._navigator.camera is None else self._ahead.look(self._walker.qpos[None])
         self._choice = decide(self._navigator, goal[None], self._choice, pose, believed, depth)
         self._command[0] = [self._choice[0, 0], 0.0, self._choice[0, 1]]
+        tell = getattr(self._navigator, "occupied", lambda: np.zeros((0, 2)))  # navigators may have such a method
+        c, s = np.cos(self._yaw), np.sin(self._yaw)
+        self._occupied = tell() @ np.array([[c, s], [-s, c]]) + self._xy
 
     # ---- the world -------------------------------------------------------------------------------------------------
 

@@ -59,6 +59,7 @@ LAYERS = {
     "contacts": "contacts",
     "forces": "forces on the feet",
     "footholds": "footholds",
+    "occupied": "what the navigation policy remembers",
     "command": "commanded path",
     "cameras": "images at the cameras",
 }
@@ -76,7 +77,7 @@ CONTACT_COLOURS = {
 """Of contacts: feet by what they touch, other parts by what they are."""
 
 _PATH, _COMMAND, _FORCE, _GOAL = (37, 99, 235), (255, 183, 3), (20, 160, 150), (34, 160, 84)
-_PLANNED, _PREDICTED = (16, 185, 129), (217, 70, 239)
+_PLANNED, _PREDICTED, _OCCUPIED = (16, 185, 129), (217, 70, 239), (8, 145, 178)
 _ARC_TIME, _ARC_POINTS, _NOSE = 1.5, 13, 0.42
 _FORCE_SCALE = 0.0012
 """Length of the arrow for a foot's contact force [m / N]: the robot's weight on two feet gives 13 cm each."""
@@ -112,10 +113,11 @@ class SceneView:
             name: scene.add_line_segments(f"/vinl/{name}", _NOWHERE, colour, thickness=width)
             for name, colour, width in (("path", _PATH, 0.025), ("command", _COMMAND, 0.035))
         }
-        shapes: tuple[tuple[str, tuple[int, int, int], float, Literal["circle", "diamond"]], ...] = (
+        shapes: tuple[tuple[str, tuple[int, int, int], float, Literal["circle", "diamond", "square"]], ...] = (
             ("contacts", (0, 0, 0), 0.05, "circle"),
             ("planned", _PLANNED, 0.06, "circle"),
             ("predicted", _PREDICTED, 0.06, "diamond"),
+            ("occupied", _OCCUPIED, 0.07, "square"),
         )
         clouds: dict[str, Any] = {
             name: scene.add_point_cloud(
@@ -131,6 +133,7 @@ class SceneView:
         self._shown = {name: name != "cameras" for name in LAYERS}
         self._path_length = -1
         self._contact_count = (-1, -1.0)
+        self._occupied: np.ndarray | None = None
 
     # ---- what is asked of it ---------------------------------------------------------------------------------------
 
@@ -148,6 +151,9 @@ class SceneView:
         for name in ("planned", "predicted"):
             points = getattr(snapshot.footholds, name)
             self._draw_points(name, np.zeros((0, 3)) if points is None else points)
+        if snapshot.occupied is not self._occupied:
+            self._occupied = snapshot.occupied
+            self._draw_points("occupied", np.column_stack([self._occupied, np.full(len(self._occupied), 0.02)]))
         self._draw_command(snapshot.qpos, snapshot.command)
 
     def draw_images(self, images: dict[str, tuple[Camera, UInt8[np.ndarray, "h w 3"]]]) -> None:

@@ -158,6 +158,8 @@ class Snapshot:
         foot_forces: (4,) size of the net contact force on each foot [N].
         images: what the depth cameras saw last, by name.
         footholds: where the feet are to come down.
+        occupied: (o, 2) cells that something stands on by the navigation policy's grid [m]; another array where they
+            change.
         duration_s: of a recording [s]; None: it is live.
         paused: whether time stands still.
         pace: wanted speed of time, 1 is real time.
@@ -181,6 +183,7 @@ class Snapshot:
     foot_forces: Float[np.ndarray, "4"]
     images: Mapping[str, DepthImage]
     footholds: Footholds = field(default_factory=Footholds)
+    occupied: Float[np.ndarray, "o 2"] = field(default_factory=lambda: np.zeros((0, 2)))
     duration_s: float | None = None
     paused: bool = False
     pace: float = 1.0

@@ -144,7 +144,7 @@ class Viewer:
     def add_replay_controls(self, labels: Sequence[str], number: int) -> None:
         """The panel of a recording, see ``ReplayControls``."""
         self._controls = ReplayControls(self._server.gui, self.session.ask, labels, number, self.session.snapshot)
-        self._add_view([name for name in LAYERS if name not in ("forces", "footholds")])
+        self._add_view([name for name in LAYERS if name not in ("forces", "footholds", "occupied")])
 
     def start(self) -> Viewer:
         """Draw from now on."""

@@ -132,6 +132,12 @@ class LearnedNavigator:
         self._last = np.clip(np.asarray(action, np.float32), -1.0, 1.0)
         return self._range.velocity(self._last)
 
+    def occupied(self) -> Float[np.ndarray, "k 2"]:
+        """What stands around a single robot by the grid that its policy keeps, in the heading frame of the last
+        decision [m]; no points if it keeps none."""
+        found = getattr(self.policy, "occupied", list[np.ndarray])()
+        return found[0] if found else np.zeros((0, 2), np.float32)
+
     def overrule(self, which: Bool[np.ndarray, " n"], velocity: Float[np.ndarray, "n 2"]) -> None:
         """These robots do something else than the policy said: that is what it knows as its last action."""
         self._last[which] = self._range.action(velocity[which])
