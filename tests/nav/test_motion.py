@@ -111,9 +111,11 @@ def test_execution_lags_and_slips(blind, homes):
 
 
 def test_gives_way_when_it_turns_against_something(blind, homes):
-    def run(give_way):
+    def run(give_way, held_share=0.0):
         rng = np.random.default_rng(1)
-        environment = NavEnvironment(replace(blind, execution=ExecutionConfig(give_way=give_way)), homes)
+        environment = NavEnvironment(
+            replace(blind, execution=ExecutionConfig(give_way=give_way, held_share=held_share)), homes
+        )
         home, xy, yaw = scatter(homes, rng)
         put(environment, home, xy, yaw)
         before = environment.state["position"].clone(), environment.state["yaw"].clone()
@@ -126,7 +128,11 @@ def test_gives_way_when_it_turns_against_something(blind, homes):
 
     blocked, way, turn, _, _, _ = run(0.0)
     assert blocked.any() and way[blocked].max() < 1e-6 and turn[blocked].abs().max() < 1e-6
+    touched, _, turned, _, _, _ = run(0.1, held_share=0.5)
+    held = turned[touched].abs() < 1e-6
+    assert 0.35 < held.float().mean() < 0.9  # half of the episodes, and where nothing helps
     touched, pushed, turned, told, environment, home = run(0.1)
+    assert (turned[touched].abs() < 1e-6).float().mean() < held.float().mean() - 0.2
     assert torch.equal(touched, blocked)
     torch.testing.assert_close(way[~blocked], pushed[~blocked])
     assert pushed[blocked].max() < 0.1 + 1e-5

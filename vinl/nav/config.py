@@ -161,6 +161,7 @@ class ExecutionConfig:
         amplitude: range of a factor of an episode on the noises and the slip, uniform; 0 is sure of foot.
         give_way: a step that would touch something is not cancelled as a whole: the robot turns on the spot, and
             what its corners meet pushes it so far back or aside at most [m]; 0: cancelled as a whole [paper].
+        held_share: fraction of the episodes in which it is cancelled as a whole all the same.
     """
 
     speed_lag: float = 0.0
@@ -174,11 +175,14 @@ class ExecutionConfig:
     yaw_drift: float = 0.0
     amplitude: Range = (1.0, 1.0)
     give_way: float = 0.0
+    held_share: float = 0.0
 
     def __post_init__(self) -> None:
         unit = dict.fromkeys(("speed_noise", "yaw_noise", "side_slip", "stopped_noise", "yaw_drift"), (0, 1))
         lags, gains = dict.fromkeys(("speed_lag", "yaw_lag"), (0, 5)), dict.fromkeys(("speed_gain", "yaw_gain"), (0, 2))
-        check_limits(self, "execution.", **lags, **gains, **unit, amplitude=(0, 10), give_way=(0.0, 0.5))
+        check_limits(
+            self, "execution.", **lags, **gains, **unit, amplitude=(0, 10), give_way=(0, 0.5), held_share=(0, 1)
+        )
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,7 @@ class Robots:
     amplitude: wp.array(dtype=wp.float32)  # of this episode's sway
     sway: wp.array(dtype=wp.vec3)  # roll, pitch and height within the episode, each of variance 1
     previous: wp.array(dtype=wp.vec2)  # what the robot knows of its last step
+    give_way: wp.array(dtype=wp.float32)  # of this episode
 
 
 @wp.struct
@@ -67,6 +68,7 @@ class Rules:
     yaw_drift: wp.float32
     execution_amplitude: wp.vec2
     give_way: wp.float32
+    held_share: wp.float32
     margin: wp.float32
     sees_motion: wp.int32
     tilt: wp.vec2
@@ -183,7 +185,7 @@ def move_robots(
     straight: wp.array(dtype=wp.float32),
 ):
     """One step: constant speed, slip and yaw rate over the period. If the swept rectangle touches, it is cancelled as a
-    whole, or all but its turn (``Rules.give_way``).
+    whole, or all but its turn (``Robots.give_way``).
 
     Writes pose, velocity and distance of the robots, the path moved [m], 1 where it touched, 1 where something lies
     within the margin of where it ends, and the straight distance to the goal [m]. Where the goal cannot be reached from
@@ -224,12 +226,12 @@ def move_robots(
         p = start
         turned = bool(False)
         moved[n] = 0.0
-        if rules.give_way > 0.0:
+        if robots.give_way[n] > 0.0:
             ahead = wp.vec2(wp.cos(yaw), wp.sin(yaw))
             aside = wp.vec2(-ahead[1], ahead[0])
             k = int(0)
             while k < 7 and not turned:
-                pushed = 0.5 * rules.give_way * wp.float32((k + 2) // 3)
+                pushed = 0.5 * robots.give_way[n] * wp.float32((k + 2) // 3)
                 side = (k + 2) % 3
                 to = wp.where(side == 0, -ahead, wp.where(side == 1, aside, -aside))
                 push = to * (pushed / rules.period)
@@ -333,6 +335,7 @@ def place_robots(
     if wp.randf(state) < rules.ceiling_share:
         ceiling = mix(rules.ceiling, wp.randf(state))
     robots.mount[n] = wp.vec4(roll, pitch, height, ceiling)
+    robots.give_way[n] = wp.where(wp.randf(state) < rules.held_share, 0.0, rules.give_way)
 
 
 @wp.kernel
