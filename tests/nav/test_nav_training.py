@@ -20,6 +20,7 @@ from vinl.nav.config import NavConfig
 from vinl.nav.learning_config import NavPpoConfig
 from vinl.nav.recurrent_model import build_actor, load_critic, load_start, save_critic
 from vinl.nav.training import build_algorithm, build_environment, make_card, separate
+from vinl.policies.card import read_card
 from vinl.policies.io import load_policy, save_policy
 from vinl.policies.nav_actor import NavActor
 
@@ -156,6 +157,7 @@ def test_time_ends_a_training_and_cools_it(tmp_path, small, capsys):
     assert "trained" in capsys.readouterr().out
     curve = rows(run)
     assert 1 <= len(curve) < 1000
+    assert read_card(run / "policy").training["iterations"] == len(curve)
     assert len(curve) < 3 or curve[-1]["action_std"] < curve[0]["action_std"] - 0.05
 
 

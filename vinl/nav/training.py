@@ -142,7 +142,8 @@ def train_navigator(
 
     def write(model: RecurrentActorCritic, samples: int, folder: Path) -> None:
         assert isinstance(model.actor, NavActor)
-        save_policy(folder, model.actor, make_card(run.path.name, config, samples, commit, origin))
+        trained = replace(config, iterations=max(loop.current_learning_iteration, 1))  # so far, or when time was up
+        save_policy(folder, model.actor, make_card(run.path.name, trained, samples, commit, origin))
 
     def export(model: RecurrentActorCritic, samples: int) -> None:
         if peers.leads:
