@@ -124,7 +124,10 @@ def test_one_description_everywhere() -> None:
 def test_table_on_the_page_is_the_walked_one() -> None:
     """Success, SPL and both counts of collisions of every row, as the files of docs/results have them."""
     page = (ROOT / "docs" / "results.md").read_text()
-    files = [json.loads((ROOT / "docs" / "results" / f"{name}.json").read_text()) for name in ("table", "oracle", "teacher", "teacher_oracle")]
+    files = [
+        json.loads((ROOT / "docs" / "results" / f"{name}.json").read_text())
+        for name in ("table", "oracle", "teacher", "teacher_oracle")
+    ]
     walked = [row for file in files for row in file["rows"].values()]
     rows = [line for line in page.splitlines() if re.match(r"\| \**`\w+` \+ ", line)]
     assert len(rows) == len(walked)
