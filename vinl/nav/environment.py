@@ -305,7 +305,7 @@ class NavEnvironment:
         state, rules = self.state, self.config.reward
         state["action"].copy_(action.detach()).clamp_(-1.0, 1.0)
         state["chance"][1] += 1
-        before, place, believed = state["distance"].clone(), state["position"].clone(), self._believe().clone()
+        before, place, believed = state["distance"].clone(), state["position"].clone(), self._believe()
         self._launch(
             move_robots,
             self.num_envs,

@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from vinl.gait.local_map import POINTS, WALL
+from vinl.policies.rolling_cells import find_stale, turned
 from vinl.robot.aliengo import CONTROL_DT
 from vinl.robot.cameras import Camera
 
@@ -121,12 +122,11 @@ class ElevationMap(nn.Module):
         """
         before = self._cell_of(state.pose[:, :2])
         half = state.pose[:, 2:] + 0.5 * motion[:, 3:]
-        way = torch.cat(_turned(half, motion[:, :1], motion[:, 1:2]), 1)
+        way = torch.cat(turned(half, motion[:, :1], motion[:, 1:2]), 1)
         pose = torch.cat([state.pose[:, :2] + way, state.pose[:, 2:] + motion[:, 3:]], 1)
         after = self._cell_of(pose[:, :2])
-        stale = _place(before) != _place(after)  # (n, 2, SIDE): columns and rows that stand for other ground now
         heights = state.heights.reshape(-1, SIDE, SIDE)
-        heights = torch.where(stale[:, 0, :, None] | stale[:, 1, None, :], UNSEEN, heights)
+        heights = torch.where(find_stale(before, after, SIDE), UNSEEN, heights)
         return MapState(pose, heights.reshape(-1, SIDE**2), state.recent)
 
     def see(
@@ -197,17 +197,12 @@ class ElevationMap(nn.Module):
     ) -> Int[Tensor, "n k"]:
         """Of the cells at points of the heading frame."""
         column, row = (
-            cls._cell_of(at[:, None] + turned)
-            for at, turned in zip(pose[:, :2].unbind(1), _turned(pose[:, 2:], x, y), strict=True)
+            cls._cell_of(at[:, None] + away)
+            for at, away in zip(pose[:, :2].unbind(1), turned(pose[:, 2:], x, y), strict=True)
         )
         # from a cell's middle: where a device rounds 112 / 112 to less than 1, a whole number would be cell 112 of 112
         column, row = (cell - SIDE * torch.floor((cell + 0.5) * _PER_SIDE) for cell in (column, row))
         return (column * SIDE + row).long()  # whole numbers below 2^24
-
-
-def _turned(angle: Float[Tensor, "n 1"], x: Float[Tensor, "*n k"], y: Float[Tensor, "*n k"]) -> tuple[Tensor, Tensor]:
-    c, s = torch.cos(angle), torch.sin(angle)
-    return c * x - s * y, s * x + c * y
 
 
 def _stood(recent: Float[Tensor, "n ages 13"], age: Float[Tensor, " n"]) -> Float[Tensor, "n 13"]:
@@ -215,11 +210,6 @@ def _stood(recent: Float[Tensor, "n ages 13"], age: Float[Tensor, " n"]) -> Floa
     steps = (age / CONTROL_DT).round().long().clamp(0, AGES - 1)
     then = recent.gather(1, steps[:, None, None].expand(-1, 1, recent.shape[2]))[:, 0]
     return torch.where((then == 0).all(1, keepdim=True), recent[:, 0], then)
-
-
-def _place(cell: Float[Tensor, "n 2"]) -> Float[Tensor, "n 2 side"]:
-    """Which of the cells that do not move each column and row stands for with the robot in this one."""
-    return cell[..., None] + (torch.arange(SIDE, device=cell.device) - cell[..., None] + SIDE // 2) % SIDE
 
 
 def _tilt(z: Tensor, ahead: Tensor, known: Tensor) -> Tensor:

@@ -9,7 +9,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from vinl.policies.occupancy_grid import OCCUPIED, GridState, index_of, known_cells, turned
+from vinl.policies.occupancy_grid import OCCUPIED, GridState, index_of, known_cells
+from vinl.policies.rolling_cells import turned
 
 DIRECTIONS = 24
 """Rays, from straight ahead on to the left."""

@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
+from vinl.policies.rolling_cells import find_stale, place_cells, turned
 from vinl.robot.cameras import Camera
 
 CELL = 0.15
@@ -119,8 +120,7 @@ class OccupancyGrid(nn.Module):
         before = torch.where(fresh[:, None], 0.0, state.pose[0])
         x, y = turned(before[:, 2:], step[:, :1], step[:, 1:2])
         after = torch.where(fresh[:, None], 0.0, before + torch.cat([x, y, step[:, 2:]], 1))
-        stale = _place(cell_of(before)) != _place(cell_of(after))  # (n, 2, SIDE) stand for other ground now
-        unknown = (stale[:, 0, :, None] | stale[:, 1, None, :]).flatten(1) | fresh[:, None]
+        unknown = find_stale(cell_of(before), cell_of(after), SIDE).flatten(1) | fresh[:, None]
         cells, bumps = (torch.where(unknown, 0.0, part[0]) for part in (state.cells, state.bumps))
         back = asked < 0
         fast, still = (torch.where(back, behind, ahead) for ahead, behind in zip(*_MET, strict=True))
@@ -178,7 +178,7 @@ def known_cells(state: GridState) -> Float[Tensor, "n cells"]:
 def find_occupied(state: GridState) -> list[Float[Tensor, "_ 2"]]:
     """For each robot the middles of the cells that are taken for occupied, in its heading frame [m]."""
     pose, occupied = state.pose[0], known_cells(state).unflatten(1, (SIDE, SIDE)) > OCCUPIED
-    cells = _place(cell_of(pose))
+    cells = place_cells(cell_of(pose), SIDE)
     found = []
     for k in range(len(pose)):
         column, row = occupied[k].nonzero(as_tuple=True)
@@ -196,15 +196,3 @@ def index_of(x: Float[Tensor, "*n"], y: Float[Tensor, "*n"]) -> Int[Tensor, "*n"
     """Number of the cell of a place [m]."""
     column, row = (torch.floor(part / CELL).remainder(SIDE) for part in (x, y))
     return (column * SIDE + row).long()
-
-
-def turned(angle: Float[Tensor, "..."], x: Float[Tensor, "..."], y: Float[Tensor, "..."]) -> tuple[Tensor, Tensor]:
-    """Points of the heading frame in the grid's axes."""
-    c, s = torch.cos(angle), torch.sin(angle)
-    return c * x - s * y, s * x + c * y
-
-
-def _place(cell: Int[Tensor, "n 2"]) -> Int[Tensor, "n 2 side"]:
-    """Which of the cells that do not move each column and row stands for with the robot in this one."""
-    half = SIDE // 2
-    return cell[..., None] + (torch.arange(SIDE, device=cell.device) - cell[..., None] + half).remainder(SIDE) - half
