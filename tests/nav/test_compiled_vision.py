@@ -4,17 +4,18 @@ import pytest
 import torch
 from torch import nn
 
-from vinl.nav.compiled_vision import _WAYS, CompiledVision
+from vinl.nav.compiled_vision import _OPTIONS, CompiledVision
 from vinl.policies.vision import SmallCnn
 
 _WRONG = {
     "rows of other images": lambda features: features.roll(1, 0),
-    "not a number": lambda features: torch.full_like(features, torch.nan),
+    "not a number": lambda features: features * torch.nan,
+    "other gradients": lambda features: features.detach() + 3 * (features - features.detach()),
 }
 
 
 @pytest.mark.parametrize("wrong", _WRONG.values(), ids=_WRONG)
-@pytest.mark.parametrize("wrong_ways", range(len(_WAYS) + 1))
+@pytest.mark.parametrize("wrong_ways", range(len(_OPTIONS) + 1))
 def test_only_what_computes_the_same_is_used(wrong, wrong_ways, monkeypatch, capsys):
     tried = []
 
@@ -36,7 +37,7 @@ def test_only_what_computes_the_same_is_used(wrong, wrong_ways, monkeypatch, cap
         with torch.set_grad_enabled(gradients):
             compiled.check(depth)
             assert torch.equal(vision(depth.flatten(0, 1)), vision.forward(depth.flatten(0, 1)))
-    assert tried == list(_WAYS[: wrong_ways + 1])
+    assert tried == list(_OPTIONS[: wrong_ways + 1])
     warnings = capsys.readouterr().err.splitlines()
-    assert len(warnings) == wrong_ways + (wrong_ways == len(_WAYS))
+    assert len(warnings) == wrong_ways + (wrong_ways == len(_OPTIONS))
     assert all(line.startswith("warning: ") for line in warnings)

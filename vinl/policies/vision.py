@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import torch
@@ -110,10 +111,17 @@ class GroupNorm(nn.GroupNorm):
     """Group normalisation in the type of its input: autocast would turn maps to float32 and back around each one.
 
     The sums inside are float32 whatever the type.
+
+    Attributes:
+        kernel: what does the same faster in a training, ``vinl.nav.norm_kernel.group_norm``.
     """
+
+    kernel: Callable[[Tensor, Tensor, Tensor, int, float], tuple[Tensor, ...]] | None = None
 
     def forward(self, input: Tensor) -> Tensor:
         """Normalised maps of the same shape and type."""
+        if self.kernel is not None:
+            return self.kernel(input, self.weight, self.bias, self.num_groups, self.eps)[0]
         with torch.autocast(input.device.type, enabled=False):
             if torch.compiler.is_compiling():
                 return self._in_two_passes(input)
