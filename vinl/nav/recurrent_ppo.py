@@ -19,8 +19,10 @@ from vinl.config.errors import InputError
 from vinl.nav.compiled_vision import CompiledVision
 from vinl.nav.config import NavConfig
 from vinl.nav.learning_config import NavPpoConfig
+from vinl.nav.memory_graph import MemoryGraph
 from vinl.nav.recurrent_model import Outlook, RecurrentActorCritic, RecurrentStorage, as_unit
 from vinl.nav.rollout_planner import RolloutPlanner
+from vinl.policies.depth_memory import DepthMemory
 from vinl.policies.nav_actor import NavActor
 from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers
@@ -66,10 +68,13 @@ class RecurrentPPO:
             capturable=on_gpu,  # type: ignore[arg-type]
         )
         rate.bind(self.optimizer)
-        vision = getattr(getattr(model.actor, "memory", None), "vision", None)
+        memory = getattr(model.actor, "memory", None)
+        vision = getattr(memory, "vision", None)
         self._compiled: CompiledVision | None = None
         if config.compiled and on_gpu and isinstance(vision, nn.Module):
             self._compiled = CompiledVision(vision)  # fuses what lies between convolutions
+        if config.compiled and on_gpu and isinstance(memory, DepthMemory) and memory.remembers:
+            memory.loop = MemoryGraph(memory)
         self._state = tuple(part.clone() for part in storage.state)
         self._planner: RolloutPlanner | None = None
         if isinstance(model.actor, NavActor) and model.actor.grid is not None:
