@@ -73,6 +73,9 @@ def _spread(
         going = (tl.maximum(down, up) > ENOUGH) & (rounds < ROUNDS)
 
 
+@torch.library.custom_op(
+    "vinl::spread", mutates_args=(), schema="(Tensor distance, Tensor cost) -> Tensor"
+)  # so that what is compiled around it leaves it alone
 def spread_in_blocks(
     distance: Float[Tensor, "n side side"], cost: Float[Tensor, "n side side"]
 ) -> Float[Tensor, "n side side"]:
@@ -83,3 +86,8 @@ def spread_in_blocks(
         distance, cost.contiguous(), SIDE=side, LANES=lanes, ROUNDS=_ROUNDS, ENOUGH=_ENOUGH, FAR=FAR, num_warps=1
     )
     return distance
+
+
+@spread_in_blocks.register_fake
+def _(distance: Tensor, cost: Tensor) -> Tensor:
+    return torch.empty_like(distance, memory_format=torch.contiguous_format)

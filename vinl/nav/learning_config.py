@@ -73,7 +73,8 @@ class NavPpoConfig:
             weights of a policy (``--from``) would otherwise teach them nonsense.
         image_type: how the roll-out keeps images: ``float16``, or ``uint8`` in half the memory.
         bf16: images in bfloat16 (GPU only).
-        compiled: image network through ``torch.compile`` (GPU only): a minute at the start, then faster.
+        compiled: image network and plans through ``torch.compile``, the memory's loop as one CUDA graph (GPU only): a
+            minute at the start, then faster.
         keep_at: the policy is also kept aside once after so many samples.
     """
 
