@@ -7,10 +7,10 @@ import sys
 from typing import Any
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from vinl.nav.recurrent_model import as_unit
-from vinl.policies.vision import GroupNorm
+from vinl.policies.vision import GroupNorm, Vision
 
 _OPTIONS: tuple[dict[str, Any], ...] = ({"comprehensive_padding": False}, {"layout_optimization": False})
 """Options of ``torch.compile`` that are tried in turn. With its own, torch 2.11 on an H200 computed other features
@@ -35,7 +35,7 @@ class CompiledVision:
         vision: (n, height, width) images to (n, k) features; compiled in place, the names of its weights stay.
     """
 
-    def __init__(self, vision: nn.Module) -> None:
+    def __init__(self, vision: Vision) -> None:
         self._vision = vision
         self._norms = [part for part in vision.modules() if isinstance(part, GroupNorm)]
         kernel = _find_kernel(self._norms) if self._norms else None
@@ -85,7 +85,7 @@ class CompiledVision:
         if self._norms:  # the kernel reads maps whose channels lie last
             layout = torch.channels_last if kernel else torch.contiguous_format
             self._vision.to(memory_format=layout)  # pyright: ignore[reportCallIssue]
-            self._vision.channels_last = bool(kernel)  # pyright: ignore[reportAttributeAccessIssue]
+            self._vision.channels_last = bool(kernel)
         if options:
             self._vision.compile(dynamic=False, options=options)
         else:

@@ -73,9 +73,8 @@ def _spread(
         going = (tl.maximum(down, up) > ENOUGH) & (rounds < ROUNDS)
 
 
-@torch.library.custom_op(
-    "vinl::spread", mutates_args=(), schema="(Tensor distance, Tensor cost) -> Tensor"
-)  # so that what is compiled around it leaves it alone
+# an operation of torch, so that what is compiled around it leaves it alone
+@torch.library.custom_op("vinl::spread", mutates_args=(), schema="(Tensor distance, Tensor cost) -> Tensor")
 def spread_in_blocks(
     distance: Float[Tensor, "n side side"], cost: Float[Tensor, "n side side"]
 ) -> Float[Tensor, "n side side"]:

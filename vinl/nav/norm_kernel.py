@@ -167,7 +167,8 @@ def _keep(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None
 
 
 def _go_back(ctx: Any, dy: Tensor, *unused: Tensor) -> tuple[Tensor | None, ...]:
-    return *_group_norm_backward(dy, *ctx.saved_tensors, ctx.groups), None, None
+    x, weight, means, scales = ctx.saved_tensors
+    return *_group_norm_backward(dy, x, weight, means, scales, ctx.groups), None, None
 
 
-group_norm.register_autograd(_go_back, setup_context=_keep)
+group_norm.register_autograd(_go_back, setup_context=_keep)  # pyright: ignore[reportFunctionMemberAccess]

@@ -24,6 +24,7 @@ from vinl.nav.recurrent_model import Outlook, RecurrentActorCritic, RecurrentSto
 from vinl.nav.rollout_planner import RolloutPlanner
 from vinl.policies.depth_memory import DepthMemory
 from vinl.policies.nav_actor import NavActor
+from vinl.policies.vision import Vision
 from vinl.rl.learning_rate import DeviceRate
 from vinl.rl.parallel import Peers
 
@@ -71,7 +72,7 @@ class RecurrentPPO:
         memory = getattr(model.actor, "memory", None)
         vision = getattr(memory, "vision", None)
         self._compiled: CompiledVision | None = None
-        if config.compiled and on_gpu and isinstance(vision, nn.Module):
+        if config.compiled and on_gpu and isinstance(vision, Vision):
             self._compiled = CompiledVision(vision)  # fuses what lies between convolutions
         if config.compiled and on_gpu and isinstance(memory, DepthMemory) and memory.remembers:
             memory.loop = MemoryGraph(memory)
