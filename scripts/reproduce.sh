@@ -6,7 +6,7 @@
 # RUNS is where the runs go (default: runs). A run that is there already is gone on with; one that is complete is left.
 # Beside each: samples, and the minutes that they take at the speeds that the project holds itself to on one H200
 # (stages 1 and 2: 260,000 samples/s; stage 3: 70,000). Measured last: 247,000 and 287,000 on an H100, 75,700 on an H200;
-# nav 80,000 on an H200, 162,000 on two; nav-blind 109,700 and 211,000.
+# nav 114,400 on an H200; nav-blind 109,700, 211,000 on two.
 set -euo pipefail
 device="${1:-cuda}"
 runs="${RUNS:-runs}"
@@ -30,5 +30,5 @@ train loco no_pretraining --config loco/no_pretraining                         #
 train loco mlp --config loco/mlp --from "$runs/teacher"                        #  15 M   3.5 min
 
 # navigation, and what it is held against
-train nav nav --iterations 836                                                 # 164 M  34.3 min
+train nav nav --iterations 836                                                 # 164 M  24.0 min
 train nav nav-blind --config nav/blind --iterations 1000                       #  98 M   9.0 min
