@@ -54,6 +54,28 @@ def algorithm(actor):
     return RecurrentPPO(RecurrentActorCritic(actor), storage, DeviceRate(1e-3), config)
 
 
+def test_a_run_goes_on_where_convolutions_lie_otherwise(actor):
+    first = algorithm(actor)
+    first.model.to(memory_format=torch.channels_last)  # as where norms have a kernel
+    depth, vector, fresh = draw(STEPS + 1)
+
+    def learn(one):
+        torch.manual_seed(1)
+        with torch.no_grad():
+            for k in range(STEPS):
+                one.act(TensorDict({"depth": depth[k], "vector": vector[k]}, [N]))
+                one.process_env_step(TensorDict({}, [N]), torch.rand(N), fresh[k + 1], {})
+            one.compute_returns(TensorDict({"depth": depth[STEPS], "vector": vector[STEPS]}, [N]))
+        one.update()
+
+    learn(first)
+    second = algorithm(NavActor(**actor.arguments))
+    second.load(first.save())
+    for one in (first, second):
+        learn(one)
+    torch.testing.assert_close(second.model.state_dict(), first.model.state_dict(), rtol=1e-4, atol=1e-6)
+
+
 def test_the_policy_acts_on_what_the_whole_network_would_see_and_goes_on_after_a_save(actor):
     ppo = algorithm(actor)
     depth, vector, fresh = draw(STEPS + 1)

@@ -68,12 +68,12 @@ class CompiledVision:
         self._take_kernel(None)
         with torch.no_grad():
             plain = self._vision.forward(images)
-        found = [_difference([features.detach()], [plain]), 0.0]
+        difference, of_gradients = _difference([features.detach()], [plain]), 0.0
         if torch.is_grad_enabled():
             wanted = self._gradients(self._vision.forward(images[:_IMAGES]))
-            found[1] = _difference(self._gradients(features), wanted)
+            of_gradients = _difference(self._gradients(features), wanted)
         self._take_kernel(kernel)
-        return found[0], found[1]
+        return difference, of_gradients
 
     def _gradients(self, features: Tensor) -> list[Tensor]:
         energy = features[:_IMAGES].float().square().sum()

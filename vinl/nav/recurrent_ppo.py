@@ -183,6 +183,9 @@ class RecurrentPPO:
         """Go on from what ``save`` returned; robots of another number begin new episodes of memory."""
         self.model.load_state_dict(saved["model"], strict=strict)
         self.optimizer.load_state_dict(copy.deepcopy(saved["optimizer"]))
+        for weight, kept in self.optimizer.state.items():  # in the weight's layout, which may have been another
+            for name in ("exp_avg", "exp_avg_sq"):
+                kept[name] = torch.empty_like(weight).copy_(kept[name])
         self.rate.set(saved["learning_rate"])
         self.rate.bind(self.optimizer)
         if len(saved["fresh"]) == len(self._fresh):
