@@ -4,6 +4,7 @@ import pytest
 import torch
 from tensordict import TensorDict
 
+from vinl.nav import recurrent_ppo
 from vinl.nav.learning_config import NavPpoConfig
 from vinl.nav.recurrent_model import RecurrentActorCritic, RecurrentStorage
 from vinl.nav.recurrent_ppo import RecurrentPPO
@@ -52,6 +53,14 @@ def algorithm(actor):
     )
     config = NavPpoConfig(steps=STEPS, epochs=1, minibatches=2)
     return RecurrentPPO(RecurrentActorCritic(actor), storage, DeviceRate(1e-3), config)
+
+
+def test_without_triton_nothing_is_compiled(monkeypatch, capsys):
+    monkeypatch.setattr(recurrent_ppo, "find_spec", {"triton": None}.__getitem__)
+    assert not recurrent_ppo._has_triton()
+    assert capsys.readouterr().err.startswith("warning: no Triton; nothing is compiled")
+    monkeypatch.setattr(recurrent_ppo, "find_spec", {"triton": "here"}.__getitem__)
+    assert recurrent_ppo._has_triton() and not capsys.readouterr().err
 
 
 def test_a_run_goes_on_where_convolutions_lie_otherwise(actor):

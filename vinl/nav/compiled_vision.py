@@ -98,11 +98,8 @@ class CompiledVision:
 
 
 def _find_kernel(norms: list[GroupNorm]) -> Any:
-    try:
-        from vinl.nav.norm_kernel import group_norm
-    except ImportError as error:
-        print(f"warning: no Triton ({error}); norms are slower", file=sys.stderr)
-        return None
+    from vinl.nav.norm_kernel import group_norm  # Triton
+
     fitting = all(norm.num_groups == 1 or norm.num_channels.bit_count() == 1 for norm in norms)
     return group_norm if fitting else None
 

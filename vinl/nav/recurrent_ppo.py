@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import copy
 import math
+import sys
+from importlib.util import find_spec
 from typing import Any
 
 import torch
@@ -71,15 +73,16 @@ class RecurrentPPO:
         rate.bind(self.optimizer)
         memory = getattr(model.actor, "memory", None)
         vision = getattr(memory, "vision", None)
+        fast = config.compiled and on_gpu and _has_triton()
         self._compiled: CompiledVision | None = None
-        if config.compiled and on_gpu and isinstance(vision, Vision):
+        if fast and isinstance(vision, Vision):
             self._compiled = CompiledVision(vision)  # fuses what lies between convolutions
-        if config.compiled and on_gpu and isinstance(memory, DepthMemory) and memory.remembers:
+        if fast and isinstance(memory, DepthMemory) and memory.remembers:
             memory.loop = MemoryGraph(memory)
         self._state = tuple(part.clone() for part in storage.state)
         self._planner: RolloutPlanner | None = None
         if isinstance(model.actor, NavActor) and model.actor.grid is not None:
-            self._planner = RolloutPlanner(model.actor, storage.robots, self.device, config.compiled and on_gpu)
+            self._planner = RolloutPlanner(model.actor, storage.robots, self.device, fast)
         self._fresh = torch.ones(storage.robots, dtype=torch.bool, device=self.device)
         self._sums = torch.zeros(len(_SUMS), device=self.device)
         self._kl = torch.zeros((), device=self.device)
@@ -268,6 +271,14 @@ def build_storage(config: NavConfig, actor: NavActor, device: torch.device | str
         actor.memory.initial_state(config.num_envs, device),
         device,
     )
+
+
+def _has_triton() -> bool:
+    """Whether kernels can be compiled for the GPU; asked once, for all that is compiled."""
+    if find_spec("triton") is not None:
+        return True
+    print("warning: no Triton; nothing is compiled, which is slower", file=sys.stderr)
+    return False
 
 
 def _log_prob(action: Tensor, mean: Tensor, log_std: Tensor) -> Tensor:

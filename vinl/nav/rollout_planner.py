@@ -94,11 +94,8 @@ def fast_plan(actor: NavActor, robots: int, device: torch.device) -> Plan:
 
 def fast_spread(device: torch.device) -> Spread:
     """``spread`` as one kernel, held against itself: what does not compute the same is not used."""
-    try:
-        from vinl.nav.grid_kernel import spread_in_blocks
-    except ImportError as error:
-        print(f"warning: no Triton ({error}); grids are planned on much slower", file=sys.stderr)
-        return spread
+    from vinl.nav.grid_kernel import spread_in_blocks  # Triton
+
     random = torch.Generator("cpu").manual_seed(0)
     walls = torch.rand(8, SIDE, SIDE, generator=random) < 0.2
     cost = torch.where(walls, 20.0, CELL).to(device)
